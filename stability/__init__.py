@@ -1,0 +1,40 @@
+"""Stability and bifurcations of oscillators: write the oscillator once, look at it through every lens of the field.
+
+Floquet charts, averaging, harmonic balance, continuation and simulation all take the same `System`; each result says
+how accurate it is. Everything is loaded on first use (PEP 562), so that ``import stability`` costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from ._version import __version__
+
+# public name -> module that defines it
+_EXPORTS: dict[str, str] = {
+    "Criticality": "words",
+    "Kind": "words",
+    "Status": "words",
+    "Verdict": "words",
+}
+
+# submodules that are themselves public
+_MODULES = ("errors", "models", "systems", "words")
+
+__all__ = sorted([*_EXPORTS, *_MODULES, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    if name in _EXPORTS:
+        value = getattr(import_module(f"{__name__}.{_EXPORTS[name]}"), name)
+    elif name in _MODULES:
+        value = import_module(f"{__name__}.{name}")
+    else:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

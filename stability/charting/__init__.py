@@ -1,0 +1,1 @@
+"""Stability charts over two parameters, their boundary curves and tips, and linear response."""

@@ -1,0 +1,1 @@
+"""Floquet theory: monodromy, multipliers, verdicts, Mathieu and Hill numbers."""

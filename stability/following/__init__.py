@@ -1,0 +1,1 @@
+"""Following curves: the one continuation driver."""

@@ -1,0 +1,1 @@
+"""Time integration: flows, variational equations, events."""

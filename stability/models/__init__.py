@@ -1,0 +1,1 @@
+"""The catalogue: every oscillator of the source chapter, and the classics."""
