@@ -9,13 +9,16 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from ._version import __version__
+from ._version import __version__ as __version__
 
 # public name -> module that defines it
 _EXPORTS: dict[str, str] = {
+    "ConstantAcceleration": "systems.excitation",
+    "ConstantAmplitude": "systems.excitation",
     "Criticality": "words",
     "Kind": "words",
     "Status": "words",
+    "System": "systems.system",
     "Verdict": "words",
 }
 

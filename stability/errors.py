@@ -115,7 +115,9 @@ def unknown_name(what: str, name: object, allowed: Iterable[str], owner: str = "
     return UnknownNameError(f"no {what} '{name}'; {owner} has {listing}{hint}")
 
 
-def check_names(what: str, given: Mapping[str, Any] | Iterable[str], allowed: Iterable[str], owner: str = "this system") -> None:
+def check_names(
+    what: str, given: Mapping[str, Any] | Iterable[str], allowed: Iterable[str], owner: str = "this system"
+) -> None:
     """Raise `UnknownNameError` for the first name in `given` that is not `allowed`."""
     known = list(allowed)
     for name in given:

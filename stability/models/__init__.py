@@ -1,1 +1,65 @@
-"""The catalogue: every oscillator of the source chapter, and the classics."""
+"""The catalogue: every oscillator of the source chapter, and the classics. Loaded on first use.
+
+``stability.models.<name>(...)`` gives a `System`; ``stability.models.catalogue()`` lists all entries.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from ..errors import UnknownNameError, unknown_name
+
+if TYPE_CHECKING:
+    from ._model import Model
+
+# model name -> private module
+_MODELS: dict[str, str] = {}
+
+# springs, magnets and other public things that are no models
+_OTHERS: dict[str, str] = {}
+
+__all__ = sorted([*_MODELS, *_OTHERS, "catalogue"])
+
+
+def catalogue() -> dict[str, Model]:
+    """All models by name.
+
+    Returns
+    -------
+    dict of str to Model
+
+    Examples
+    --------
+    >>> import stability as st
+    >>> st.models.catalogue()["mathieu"].source
+    'equation (40); catalogue 5'
+    """
+    return {name: getattr(import_module(f"{__name__}.{module}"), name) for name, module in _MODELS.items()}
+
+
+def by_name(name: str) -> Model:
+    """The model of this name; UnknownNameError with the nearest one otherwise."""
+    if name not in _MODELS:
+        raise unknown_name("model", name, _MODELS, "the catalogue")
+    found: Model = getattr(import_module(f"{__name__}.{_MODELS[name]}"), name)
+    return found
+
+
+def __getattr__(name: str) -> Any:
+    module = _MODELS.get(name) or _OTHERS.get(name)
+    if module is None:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise _NoSuchModel(str(unknown_name("model", name, __all__, "the catalogue")))
+    value = getattr(import_module(f"{__name__}.{module}"), name)
+    globals()[name] = value
+    return value
+
+
+class _NoSuchModel(UnknownNameError, AttributeError):
+    """A misspelt model name: an AttributeError that proposes the nearest one."""
+
+
+def __dir__() -> list[str]:
+    return list(__all__)
