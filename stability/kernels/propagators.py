@@ -26,7 +26,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ordered_product", "propagate", "rounding_error", "step_edges", "step_factors", "transition"]
+__all__ = ["cosh_sinhc", "ordered_product", "propagate", "rounding_error", "step_edges", "step_factors", "transition"]
 
 Array = NDArray[np.float64]
 Generator = Callable[[Array], Array]
@@ -234,7 +234,7 @@ def _factors_two(g1: Array, g2: Array, g3: Array, h: Array) -> Array:
     outer = _bracket(left, right)
     a, b, c = (u + v / 12.0 + w / 240.0 for u, v, w in zip(a1, a3, outer, strict=True))
     square = a * a + b * c  # minus the determinant: the square of the trace-free exponent is this times I
-    cosh, sinhc = _cosh_sinhc(square)
+    cosh, sinhc = cosh_sinhc(square)
     if np.any(mean):
         growth = np.exp(mean)
         cosh, sinhc = cosh * growth, sinhc * growth
@@ -246,7 +246,7 @@ def _factors_two(g1: Array, g2: Array, g3: Array, h: Array) -> Array:
     return out
 
 
-def _cosh_sinhc(square: Array) -> tuple[Array, Array]:
+def cosh_sinhc(square: Array) -> tuple[Array, Array]:
     """cosh(sqrt(z)) and sinh(sqrt(z)) / sqrt(z) for real z of either sign."""
     largest = float(np.abs(square).max(initial=0.0))
     if not largest <= _SERIES_LIMIT:

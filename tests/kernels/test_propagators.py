@@ -1,14 +1,16 @@
-"""Transition matrices: closed forms (constant coefficients, Meissner), scipy's expm, Liouville, order."""
+"""Transition matrices: closed forms (constant coefficients, Meissner), mpmath's expm, Liouville, order."""
 
 from __future__ import annotations
 
 import itertools
 
+import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
+from stability.kernels.hill import propagate_hill
 from stability.kernels.propagators import ordered_product, propagate, step_edges, step_factors, transition
 
 
@@ -37,7 +39,9 @@ def meissner_trace(a, b):
 def test_constant_coefficients_equal_the_matrix_exponential(n):
     matrices = np.random.default_rng(n).normal(size=(5, n, n))
     result, error, _ = transition(lambda s: np.broadcast_to(matrices, (len(s), 5, n, n)), nodes=5)
-    exact = np.array([expm(m) for m in matrices])
+    with mpmath.workdps(30):  # scipy's expm loses up to four digits on two of these matrices
+        exact = [mpmath.expm(mpmath.matrix(m.tolist()), method="taylor") for m in matrices]
+    exact = np.array([e.tolist() for e in exact], dtype=float)
     assert np.all(np.abs(result - exact).max(axis=(1, 2)) <= error)
     assert np.all(error < 1e-13 * np.maximum(1, np.abs(exact).max(axis=(1, 2))))
 
@@ -132,3 +136,35 @@ def test_two_periods_square_the_matrix_and_blocks_do_not_matter():
     two = propagate(g, step_edges(128, (), 0.0, 2.0), 900)
     np.testing.assert_allclose(two, one @ one, rtol=0, atol=1e-12)
     np.testing.assert_allclose(one[450], propagate(hill(a[450], 0.5), step_edges(64))[0], atol=1e-13)
+
+
+@pytest.mark.parametrize("steps", [24, 96])
+def test_hill_kernel_is_the_general_kernel_on_a_scalar_equation(steps):
+    a, b = np.array([-0.4, 0.8, 3.1]), 1.2
+    edges = step_edges(steps)
+
+    def stiffness(s):
+        s = s[:, None] if s.ndim == 1 else s
+        return 4 * np.pi**2 * (a + b * np.cos(2 * np.pi * s) + 0.3 * np.sin(4 * np.pi * s))
+
+    def generator(s):
+        g = np.zeros((len(s), 3, 2, 2))
+        g[..., 0, 1] = 1.0
+        g[..., 1, 0] = -stiffness(s)
+        return g
+
+    planes, matrix = propagate_hill(stiffness, edges, 3), propagate(generator, edges, 3)
+    np.testing.assert_allclose(planes.reshape(2, 2, 3).transpose(2, 0, 1), matrix, rtol=1e-12, atol=1e-12)
+
+
+def test_half_period_factors_give_trace_plus_and_minus_two():
+    a, b = np.linspace(-0.5, 4, 7), 1.3
+
+    def stiffness(s):
+        return 4 * np.pi**2 * (a + b * np.cos(2 * np.pi * s)[:, None])
+
+    u1, u2, v1, v2 = propagate_hill(stiffness, step_edges(200, (), 0.0, 0.5), 7)
+    whole = propagate_hill(stiffness, step_edges(400), 7)
+    trace = whole[0] + whole[3]
+    np.testing.assert_allclose(4 * v1 * u2, trace - 2, rtol=1e-11, atol=1e-11)
+    np.testing.assert_allclose(4 * u1 * v2, trace + 2, rtol=1e-11, atol=1e-11)
