@@ -14,7 +14,22 @@ if TYPE_CHECKING:
     from ._model import Model
 
 # model name -> private module
-_MODELS: dict[str, str] = {}
+_MODELS: dict[str, str] = {
+    "mathieu": "_hill",
+    "mathieu_canonical": "_hill",
+    "hill": "_hill",
+    "meissner": "_hill",
+    "coupled_mathieu": "_hill",
+    "paul_trap": "_traps",
+    "base_driven_pendulum": "_pendulum",
+    "kapitza_pendulum": "_pendulum",
+    "variable_length_pendulum": "_pendulum",
+    "modulated_string": "_strings",
+    "rotating_shaft": "_strings",
+    "capacitance_modulated_circuit": "_circuits",
+    "inductance_modulated_circuit": "_circuits",
+    "resistance_modulated_circuit": "_circuits",
+}
 
 # springs, magnets and other public things that are no models
 _OTHERS: dict[str, str] = {}

@@ -77,7 +77,8 @@ class Model:
         return [*super().__dir__(), *self.constructors]
 
     def __repr__(self) -> str:
-        return f"Model {self.name}: {self.summary}\n  {self.equation}\n  {self.name}{self.__signature__}"
+        shown = [str(p.replace(annotation=p.empty)) for p in self.__signature__.parameters.values()]
+        return f"Model {self.name}: {self.summary}\n  {self.equation}\n  {self.name}({', '.join(shown)})"
 
 
 def _called(function: Callable[..., System], name: str, args: tuple[Any, ...], params: dict[str, Any]) -> System:

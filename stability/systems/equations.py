@@ -231,21 +231,25 @@ def system_fields(
     states = (*names, *(f"{n}_dot" for n in second))
     rhs = tuple([symbol(f"{n}_dot") if n in second else solution[n] for n in names] + [solution[n] for n in second])
     shown = {key: reduction.expressed(e, solution) for key, e in (outputs or {}).items()}
+    from .time_breaks import time_breaks
+
     values, own_units, own_bounds = _parameters(parameters)
     if period is None:
         period = forcing_period([*rhs])
     elif isinstance(period, (int, float)):
         period = sp.Float(period) if math.isfinite(period) else sp.nan
+    period = None if period is None else _canonical(period)
+    declared = tuple(_canonical(b) for b in breaks)
     return {
         "coordinates": tuple(names),
         "states": states,
         "parameters": values,
         "rhs": rhs,
-        "period_expression": None if period is None else _canonical(period),
+        "period_expression": period,
         "outputs": shown,
         "units": {**own_units, **(units or {})},
         "bounds": {**own_bounds, **(bounds or {})},
-        "breaks": tuple(_canonical(b) for b in breaks),
+        "breaks": declared or time_breaks(rhs, period, states),
         "angles": tuple(angles),
         "orders": dict(orders or {}),
         **others,
