@@ -17,6 +17,8 @@ _EXPORTS: dict[str, str] = {
     "ConstantAmplitude": "systems.excitation",
     "Criticality": "words",
     "Kind": "words",
+    "mathieu_a": "floquet.mathieu",
+    "mathieu_b": "floquet.mathieu",
     "Status": "words",
     "System": "systems.system",
     "Verdict": "words",
