@@ -32,7 +32,15 @@ _MODELS: dict[str, str] = {
 }
 
 # springs, magnets and other public things that are no models
-_OTHERS: dict[str, str] = {}
+_OTHERS: dict[str, str] = {
+    "ParallelSprings": "_spring_sums",
+    "PiecewiseSpring": "_spring_pieces",
+    "PolynomialSpring": "_spring_laws",
+    "PowerLawSpring": "_spring_laws",
+    "Spring": "_springs",
+    "TabulatedSpring": "_spring_tables",
+    "UnilateralSpring": "_spring_pieces",
+}
 
 __all__ = sorted([*_MODELS, *_OTHERS, "catalogue"])
 
