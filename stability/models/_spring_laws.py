@@ -58,7 +58,7 @@ class PowerLawSpring(Spring):
     (0.39336, 189.2)
     >>> import sympy as sp
     >>> PowerLawSpring(k1=2.0, kn=-1.0, n=1.5).expression(sp.Symbol("q", real=True))
-    2.0*q - 1.0*sign(q)*Abs(q)**(3/2)
+    2.0*q - 1.0*Abs(q)**(3/2)*sign(q)
     """
 
     k1: float

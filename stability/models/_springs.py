@@ -159,7 +159,7 @@ class Spring:
         >>> round(float(spring.backbone(1.0, 1.0, "harmonic balance")), 12)   # sqrt(1 + 3/4)
         1.322875655532
         >>> round(float(spring.backbone(1.0, 1.0)), 12)
-        1.317776065199
+        1.317776064966
         """
         name = type(self).__name__
         inertia = positive(name, "inertia", inertia, "kg" if self.motion == "translation" else "kg m^2")
