@@ -133,12 +133,12 @@ def propagate(generator: Generator, edges: Array, nodes: int = 1) -> Array:
 
 
 def rounding_error(matrix: Array, steps: int) -> Array:
-    """Size of the accumulated rounding of a product of `steps` factors, (N,): eps n (4 + steps / 4) max|M_ij|.
+    """Size of the accumulated rounding of a product of `steps` factors, (N,): eps n (8 + steps / 4) max|M_ij|.
 
     Linear in the number of steps, since equal steps repeat the same rounding; n terms stand in each scalar product.
     """
     largest = np.abs(matrix).max(axis=(-2, -1))
-    return np.asarray(np.finfo(float).eps * matrix.shape[-1] * (4.0 + 0.25 * steps) * np.maximum(1.0, largest))
+    return np.asarray(np.finfo(float).eps * matrix.shape[-1] * (8.0 + 0.25 * steps) * np.maximum(1.0, largest))
 
 
 def transition(
