@@ -34,10 +34,8 @@ def _list(console: Console) -> None:
         groups.setdefault(getattr(entry, "group", "") or "models", []).append(entry)
     for group, members in groups.items():
         console.say(group, bold=True)
-        for entry in members:
-            console.table([(entry.name, entry.summary)])
-            console.say(f"      {entry.equation}", dim=True)
-    console.say()
+        console.table([row for e in members for row in ((e.name, e.summary), ("", e.equation))])
+        console.say()
     console.say(f"{len(entries)} models; `stability models NAME` describes one.")
     console.result({"models": [_card(entry) for entry in entries.values()]})
 

@@ -165,7 +165,7 @@ def hill(
     ----------
     function : sympy expression in t, or callable, optional
         f(t). An expression may contain further parameters; a callable takes numpy arrays and needs `period`.
-        Without it f is the Fourier series of `cos` and `sin`.
+        Without it f is the Fourier series of `cos` and `sin`; without any of them, cos Omega t + 0.5 cos 2 Omega t.
     a, b, delta : float
         Mean stiffness, modulation depth, damping constant.
     cos, sin : sequences of float
@@ -187,7 +187,7 @@ def hill(
     Raises
     ------
     InputError
-        If neither or both of a function and Fourier coefficients are given, or a callable comes without a period.
+        If both a function and Fourier coefficients are given, or a callable comes without a period.
 
     References
     ----------
@@ -201,8 +201,10 @@ def hill(
     (1/4, 3/4)
     """
     series = len(tuple(cos)) + len(tuple(sin)) > 0
-    if (function is not None) == series:
-        raise InputError("hill takes either a function f(t) or Fourier coefficients cos=[...], sin=[...]")
+    if function is None and not series:
+        cos, series = (1.0, 0.5), True
+    if function is not None and series:
+        raise InputError("hill takes either a function f(t) or Fourier coefficients cos=[...], sin=[...], not both")
     values = dict(a=float(a), b=float(b), delta=float(delta))
     if function is not None and not isinstance(function, sp.Basic) and callable(function):
         if period is None:
