@@ -16,6 +16,7 @@ _EXPORTS: dict[str, str] = {
     "ConstantAcceleration": "systems.excitation",
     "ConstantAmplitude": "systems.excitation",
     "Criticality": "words",
+    "HardStop": "systems.stops",
     "Kind": "words",
     "mathieu_a": "floquet.mathieu",
     "mathieu_b": "floquet.mathieu",

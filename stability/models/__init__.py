@@ -29,10 +29,28 @@ _MODELS: dict[str, str] = {
     "capacitance_modulated_circuit": "_circuits",
     "inductance_modulated_circuit": "_circuits",
     "resistance_modulated_circuit": "_circuits",
+    "linear_oscillator": "_linear",
+    "chain": "_chain",
+    "duffing": "_duffing",
+    "duffing_textbook": "_duffing",
+    "duffing_mathieu": "_duffing",
+    "autoparametric_pendulum": "_autoparametric",
+    "autoparametric_quadratic": "_autoparametric",
+    "one_sided_magnet": "_one_sided",
+    "unilateral_spring": "_one_sided",
+    "spring_oscillator": "_stops",
+    "soft_stop_oscillator": "_stops",
+    "hard_stop_oscillator": "_stops",
+    "harvester": "_harvester",
+    "van_der_pol": "_classics",
+    "rayleigh": "_classics",
+    "lorenz": "_classics",
+    "nonlinear_absorber": "_classics",
 }
 
 # springs, magnets and other public things that are no models
 _OTHERS: dict[str, str] = {
+    "Coil": "_builder",
     "ParallelSprings": "_spring_sums",
     "PiecewiseSpring": "_spring_pieces",
     "PolynomialSpring": "_spring_laws",

@@ -147,7 +147,8 @@ class System(Constructors):
         if self.function is not None and callable(expression) and not hasattr(expression, "free_symbols"):
             value = float(expression(**values))
         else:
-            value = float(expression.subs({s: values[s.name] for s in expression.free_symbols}))
+            number = expression.subs({s: values[s.name] for s in expression.free_symbols}).evalf()
+            value = float(number) if number.is_real else math.inf
         if not math.isfinite(value) or value <= 0:
             used = ", ".join(f"{k} = {v:g}" for k, v in values.items())
             raise InputError(f"the period of '{self.name}' is {value:g} at {used}; it must be finite and positive")
