@@ -9,7 +9,6 @@ the shared program: the two agree only if both are right.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,7 +16,7 @@ import numpy as np
 import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
 
-from ._program import Program, functions_in
+from ._program import Program, functions_in, share
 from .tables import Table, TableFunction
 
 __all__ = ["SUPPORTED", "NumpyCode", "numpy_function"]
@@ -25,9 +24,9 @@ __all__ = ["SUPPORTED", "NumpyCode", "numpy_function"]
 RECIPROCALS = {"sec": "cos", "csc": "sin", "cot": "tan", "sech": "cosh", "csch": "sinh", "coth": "tanh"}
 SUPPORTED = frozenset(
     {"Add", "Mul", "Pow", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh"}
-    | {"asinh", "acosh", "atanh", "Abs", "sign", "Heaviside", "Max", "Min", "Mod", "floor", "ceiling", "frac", "sinc"}
-    | {"Piecewise", "ExprCondPair", "And", "Or", "Xor", "Not", "ITE", "StrictLessThan", "LessThan", "Equality"}
-    | {"StrictGreaterThan", "GreaterThan", "Unequality", "erf", "erfc", "PowerLog", "TableFunction", *RECIPROCALS}
+    | {"asinh", "acosh", "atanh", "Abs", "sign", "Heaviside", "Max", "Min", "Mod", "floor", "ceiling", "frac"}
+    | {"Piecewise", "ExprCondPair", "And", "Or", "Not", "StrictLessThan", "LessThan", "Equality"}
+    | {"StrictGreaterThan", "GreaterThan", "Unequality", "PowerLog", "TableFunction", *RECIPROCALS}
 )
 
 
@@ -62,12 +61,6 @@ class _Printer(NumPyPrinter):
     def _print_Or(self, node: sp.Or) -> str:
         return self._pairwise("logical_or", node.args)
 
-    def _print_Xor(self, node: sp.Xor) -> str:
-        return self._pairwise("logical_xor", node.args)
-
-    def _print_ITE(self, node: sp.ITE) -> str:
-        return f"where({', '.join(self._print(a) for a in node.args)})"
-
     def _print_Piecewise(self, node: sp.Piecewise) -> str:
         text = "nan"
         for value, condition in reversed(node.args):
@@ -94,12 +87,6 @@ class _Printer(NumPyPrinter):
     def _print_PowerLog(self, node: sp.Expr) -> str:
         return f"power_log({', '.join(self._print(a) for a in node.args)})"
 
-    def _print_erf(self, node: sp.Expr) -> str:
-        return f"erf({self._print(node.args[0])})"
-
-    def _print_erfc(self, node: sp.Expr) -> str:
-        return f"erfc({self._print(node.args[0])})"
-
     def _reciprocal(self, node: sp.Expr) -> str:
         return f"(1.0/{RECIPROCALS[type(node).__name__]}({self._print(node.args[0])}))"
 
@@ -111,15 +98,14 @@ def numpy_function(arguments: Sequence[sp.Symbol], expressions: Sequence[sp.Expr
     printer = _Printer()
     namespace: dict[str, Any] = {
         "power_log": power_log,
-        "erf": np.vectorize(math.erf, otypes=[float]),
-        "erfc": np.vectorize(math.erfc, otypes=[float]),
     }
     tables = _tables_in(expressions)
     for k, table in enumerate(tables):
         printer.tables[table] = f"table_{k}"
         namespace[f"table_{k}"] = table.evaluate
-    conditions = functions_in(expressions) & {"Piecewise", "ITE"}  # sympy's cse would name conditions like numbers
-    return sp.lambdify(list(arguments), list(expressions), [namespace, "numpy"], printer=printer, cse=not conditions)
+    conditional = "Piecewise" in functions_in(expressions)  # sympy's own cse would name conditions like numbers
+    cse: Any = share if conditional else True
+    return sp.lambdify(list(arguments), list(expressions), [namespace, "numpy"], printer=printer, cse=cse)
 
 
 def _tables_in(expressions: Sequence[sp.Expr]) -> list[Table]:

@@ -4,8 +4,8 @@ One C function per program, the loop over the points inside:
 
     void f(int64 N, const double *phase, const double *X, const double *P, int64 pstride, <inputs>, <outputs>)
 
-with X (N, n), inputs (N, n + m) and outputs row-major per point; parameters of point k at P + k*pstride (pstride 0:
-shared). Arrays that the program does not read may be null. All inputs of a point are read before its outputs are
+with X (N, n), inputs (N, n + m) and three or more outputs, row-major per point; parameters of point k at P + k*pstride
+(pstride 0: shared). Arrays that the program does not read may be null. All inputs of a point are read before its outputs are
 written. No fast-math flags anywhere: NaN stays NaN, and the order of operations is that of the expression.
 
 Elementary functions are calls into the C mathematics library under an own prefix (`stability_sin`, ...). Integer powers
@@ -27,12 +27,12 @@ from ._llvm_tables import number, table_function
 from ._program import Program
 from .tables import Table, TableFunction
 
-__all__ = ["LIBRARY_FUNCTIONS", "SUPPORTED", "TWO_ARGUMENTS", "emit"]
+__all__ = ["LIBRARY_FUNCTIONS", "OUTPUTS", "SUPPORTED", "TWO_ARGUMENTS", "emit"]
 
 LIBRARY_FUNCTIONS = {
     "sin": "sin", "cos": "cos", "tan": "tan", "asin": "asin", "acos": "acos", "atan": "atan", "atan2": "atan2",
     "sinh": "sinh", "cosh": "cosh", "tanh": "tanh", "asinh": "asinh", "acosh": "acosh", "atanh": "atanh",
-    "exp": "exp", "log": "log", "floor": "floor", "ceiling": "ceil", "erf": "erf", "erfc": "erfc",
+    "exp": "exp", "log": "log", "floor": "floor", "ceiling": "ceil",
 }  # fmt: skip
 TWO_ARGUMENTS = ("atan2", "pow", "fmod")
 RECIPROCALS = {"sec": sp.cos, "csc": sp.sin, "cot": sp.tan, "sech": sp.cosh, "csch": sp.sinh, "coth": sp.tanh}
@@ -45,7 +45,8 @@ COMPARISONS = {
     "Unequality": "une",
 }
 MAX_PRODUCT_POWER = 64
-CONNECTIVES = ("And", "Or", "Xor", "Not", "ITE")
+OUTPUTS = 3  # the least number of output arguments: F, FJ and FJP have one C signature
+CONNECTIVES = ("And", "Or", "Not")
 Register = str
 
 
@@ -93,7 +94,7 @@ class _Emitter:
                 self.lines.append(f"store double {register}, {p} {self.element(base, offset)}")
         arguments = [f"i64 %N, {p} %phase, {p} %X, {p} %P, i64 %pstride"]
         arguments += [f"{p} %V{k}" for k in range(len(program.directions))]
-        arguments += [f"{p} %Y{k}" for k in range(len(program.results))]
+        arguments += [f"{p} %Y{k}" for k in range(max(len(program.results), OUTPUTS))]
         body = "\n  ".join(self.lines)
         declared = ["declare double @llvm.sqrt.f64(double)", "declare double @llvm.fabs.f64(double)"]
         for name in sorted(self.library):
@@ -286,11 +287,6 @@ done:
         argument = self.value(node.args[0])
         return self.binary("fsub", argument, self.called("floor", argument))
 
-    def emit_sinc(self, node: sp.Expr) -> Register:
-        argument = self.value(node.args[0])
-        ratio = self.binary("fdiv", self.called("sin", argument), argument)
-        return self.select(self.compare("oeq", argument, number(0.0)), number(1.0), ratio)
-
     def emit_PowerLog(self, node: sp.Expr) -> Register:
         base, exponent, count = node.args
         power = self.called("pow", self.value(base), self.value(exponent))
@@ -319,9 +315,7 @@ done:
         parts = [self.condition(a) for a in node.args]
         if name == "Not":
             return self.line(f"xor i1 {parts[0]}, true")
-        if name == "ITE":
-            return self.line(f"select i1 {parts[0]}, i1 {parts[1]}, i1 {parts[2]}")
-        if name not in ("And", "Or", "Xor"):
+        if name not in ("And", "Or"):
             raise CompileError(f"the condition '{name}' has no machine code; use comparisons, And, Or, Not")
         result = parts[0]
         for part in parts[1:]:

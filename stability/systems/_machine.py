@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import Any
 
 from ..errors import CompileError
-from ._llvm import LIBRARY_FUNCTIONS, TWO_ARGUMENTS, emit
+from ._llvm import LIBRARY_FUNCTIONS, OUTPUTS, TWO_ARGUMENTS, emit
 from ._program import Program
 
 __all__ = ["MachineCode"]
@@ -59,7 +59,7 @@ class MachineCode:
 
     def __init__(self, program: Program) -> None:
         self.text = emit(program)
-        pointers = 3 + len(program.directions) + len(program.results)
+        arrays = len(program.directions) + max(len(program.results), OUTPUTS)
         with MachineCode._lock:
             llvm = _started()
             module = llvm.parse_assembly(self.text)
@@ -70,7 +70,7 @@ class MachineCode:
             self._engine = llvm.create_mcjit_compiler(module, machine)
             self._engine.finalize_object()
             self.address = int(self._engine.get_function_address("evaluate"))
-        kinds = [ctypes.c_int64] + [ctypes.c_void_p] * 3 + [ctypes.c_int64] + [ctypes.c_void_p] * (pointers - 3)
+        kinds = [ctypes.c_int64] + [ctypes.c_void_p] * 3 + [ctypes.c_int64] + [ctypes.c_void_p] * arrays
         self.call: Callable[..., None] = ctypes.CFUNCTYPE(None, *kinds)(self.address)
 
 

@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import CompileError, InputError
-from ._evaluator import Evaluator
+from ._evaluator import Evaluator, address_of
 
 __all__ = ["Evaluator", "evaluator"]
 
 Array = np.ndarray
+UNUSED = (None, None, None)  # the output arguments of machine code that a quantity does not have
 
 
 class ExpressionEvaluator(Evaluator):
@@ -74,12 +75,13 @@ class LlvmEvaluator(ExpressionEvaluator):
         code = self._codes.get(which) or self._code(which)
         code.call(
             len(X),
-            None if phase is None else phase.ctypes.data,
-            X.ctypes.data,
-            P.ctypes.data,
+            None if phase is None else address_of(phase),
+            address_of(X),
+            address_of(P),
             0 if P.ndim == 1 else self.m,
-            *(block.ctypes.data for block in directions),
-            *(array.ctypes.data for array in out),
+            *[address_of(block) for block in directions],
+            *[address_of(array) for array in out],
+            *UNUSED[len(out) :],
         )
 
 

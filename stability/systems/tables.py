@@ -18,9 +18,11 @@ References: C. de Boor, A Practical Guide to Splines (2001); F. N. Fritsch and R
 
 from __future__ import annotations
 
+import threading
+import weakref
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -159,8 +161,8 @@ class Table:
             raise InputError(f"table '{data['name']}': rows must be finite, one for each piece and two for the outside")
         breaks, _ = _checked(data["name"], data["breakpoints"], rows[1:-1], data["extrapolate"])
         table = cls._from_rows(data["name"], breaks, rows, data["extrapolate"])
-        error = data.get("fit_error")
-        object.__setattr__(table, "fit_error", float("nan") if error is None else float(error))
+        fit_error = data.get("fit_error")
+        object.__setattr__(table, "fit_error", float("nan") if fit_error is None else float(fit_error))
         return table
 
     @classmethod
@@ -265,12 +267,20 @@ def table_from_plain(data: Mapping[str, Any], argument: sp.Expr) -> sp.Expr:
     return Table.from_dict(data)(argument)
 
 
-@cache
+_CLASSES: weakref.WeakValueDictionary[Table, type[TableFunction]] = weakref.WeakValueDictionary()
+_CLASSES_LOCK = threading.Lock()
+
+
 def _function_class(table: Table) -> type[TableFunction]:
-    return type(table.name, (TableFunction,), {"table": table})
+    """One class for equal tables, so that equal expressions are equal; it goes when no expression uses it."""
+    with _CLASSES_LOCK:
+        known = _CLASSES.get(table)
+        if known is None:
+            known = _CLASSES[table] = type(table.name, (TableFunction,), {"table": table})
+        return known
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=128)
 def _derivative_table(table: Table) -> Table:
     rows = table.rows[:, 1:] * np.arange(1, table.rows.shape[1])
     if rows.shape[1] == 0:
