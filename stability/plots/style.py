@@ -49,7 +49,7 @@ COLOURS: Mapping[str, str] = MappingProxyType({
 })  # fmt: skip
 
 # branches and methods in one picture, in this order: neighbours differ in lightness as well as in hue
-_ORDER = ("black", "orange", "blue", "vermilion", "sky", "green", "purple", "grey")
+_ORDER = ("black", "orange", "blue", "purple", "vermilion", "sky", "green", "grey")
 SERIES: tuple[str, ...] = tuple(COLOURS[name] for name in _ORDER)
 
 LINES: Mapping[Verdict, str | tuple[float, tuple[float, ...]]] = MappingProxyType({
