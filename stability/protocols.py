@@ -87,13 +87,16 @@ class Corrected(NamedTuple):
 
 
 class Seed(NamedTuple):
-    """The first point of a problem born at a special point; `u`, `params` is the birth point or close to it."""
+    """A solution at which a new branch is born, and where it goes from there."""
 
-    u: Array  # (N,)
+    problem: Problem  # the problem to follow
+    u: Array  # (N,) the birth point
     params: Array  # (m,)
-    tangent: Array  # (N,) direction of u into the new branch; the parameter's part is found by the driver
-    sides: int  # 1: the other half is the same solutions shifted in time or mirrored; 2: both are followed and joined
-    step: float = 0.0  # size of the first step along `tangent` in the weighted norm; 0 leaves it to the driver
+    tangent: Array  # (N,) u-part of the direction of the new branch
+    parameter: float  # parameter's part of the direction (0 for pitchfork, Hopf and period doubling)
+    sides: int  # 1: the other half is the same solutions shifted in time; 2: both are followed and joined
+    kind: Kind  # of the point it is born at
+    avoid: tuple[Array, float] | None = None  # direction of the old branch: the first step is taken orthogonally to it
 
 
 class Spectrum(NamedTuple):
