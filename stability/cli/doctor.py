@@ -66,8 +66,10 @@ def _report(console: Console, document: dict[str, Any]) -> None:
         ("cores", str(document["threads"]["cores"])),
     ])
     console.say("versions", bold=True)
-    console.table([(name, version or "MISSING") for name, version in document["versions"].items()])
-    console.table([(name, version or "not installed (optional)") for name, version in document["optional"].items()])
+    console.table([
+        *((name, version or "MISSING") for name, version in document["versions"].items()),
+        *((name, version or "not installed (optional)") for name, version in document["optional"].items()),
+    ])
     console.say("back ends", bold=True)
     console.table([(name, end.get("trouble") or f"works, {1e3 * end['seconds']:.0f} ms to build and evaluate one model")
                    for name, end in document["back_ends"].items()])
