@@ -3,7 +3,8 @@
 An expression of the library is a finite tree over real symbols. Its inner nodes are
 
     add, mul, pow, exp, log, sin ... atanh, atan2, abs, sign, heaviside, floor, mod, max, min,
-    piecewise with lt, le, gt, ge, eq, ne, and, or, not;   its leaves: symbols, exact numbers, doubles, pi, e.
+    piecewise with lt, le, gt, ge, eq, ne, and, or, not;   its leaves: symbols, exact numbers, doubles, pi, e;
+    powerlog(u, p, k) = u^p (log u)^k, which our derivative rules bring in, and tabulated functions (tables.py).
 
 Each kind carries its name in trees, the sympy class and how many arguments it takes. Everything that comes from
 outside (text, files, trees) is built through `Builder`, bottom up, and a node is refused *before* sympy sees it when
@@ -27,12 +28,16 @@ from typing import Any
 import sympy as sp
 
 from ..errors import CompileError, ExpressionError
+from .expressions import PowerLog
+from .tables import TableFunction
 
-__all__ = ["KINDS", "MAX_BITS", "MAX_EXPONENT", "Builder", "NodeKind", "kind_of", "real_symbol", "valid_name"]
+__all__ = ["KINDS", "MAX_BITS", "MAX_EXPONENT", "Builder", "NodeKind", "arity", "kind_of", "real_symbol", "valid_name"]
 
 MAX_BITS = 1024  # of the numerator and of the denominator of an exact number: the range of a double
 MAX_EXPONENT = 4096  # of a power after sympy has merged powers of powers
-MAX_ALTERNATIVES = 32  # arguments of one max, min or piecewise: sympy compares them pairwise
+MAX_ALTERNATIVES = 16  # arguments of one max, min or piecewise
+MAX_CONSTANT = 16  # nodes of a constant that stays exact; a larger one becomes a double
+MAX_POWERS = 20  # powers and quotients inside one another: sympy's questions about signs go through all of them
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
@@ -76,6 +81,10 @@ def _heaviside(x: float, at_zero: float = 0.5) -> float:
     return at_zero if x == 0 else float(x > 0)
 
 
+def _powerlog(base: float, exponent: float, count: float) -> float:
+    return 0.0 if base == 0 and exponent > 0 else _power(base, exponent) * math.log(base) ** count
+
+
 def _sign(x: float) -> float:
     return float((x > 0) - (x < 0))
 
@@ -104,6 +113,7 @@ _TABLE: tuple[tuple[str, Any, int, int | None, Callable[..., Any], bool], ...] =
     ("heaviside", sp.Heaviside, 1, 2, _heaviside, False),
     ("floor", sp.floor, 1, 1, math.floor, False),
     ("mod", sp.Mod, 2, 2, _mod, False),
+    ("powerlog", PowerLog, 3, 3, _powerlog, False),
     ("max", sp.Max, 2, MAX_ALTERNATIVES, max, True),
     ("min", sp.Min, 2, MAX_ALTERNATIVES, min, True),
     ("lt", sp.StrictLessThan, 2, 2, lambda a, b: a < b, False),
@@ -128,17 +138,54 @@ def kind_of(node: sp.Basic) -> NodeKind | None:
     return _BY_CLASS.get(type(node))
 
 
-def _known_real(node: sp.Basic) -> bool:
-    return bool(getattr(node, "is_extended_real", False))
+def _construct(kind: NodeKind, args: Sequence[sp.Basic], constants: Sequence[Any]) -> sp.Basic:
+    """Call sympy's constructor, without the evaluations that expand polynomials, compare symbols or turn complex.
 
-
-def _construct(kind: NodeKind, args: Sequence[sp.Basic]) -> sp.Basic:
-    """Call sympy's constructor, without the evaluations that expand polynomials or introduce complex conjugates."""
-    if kind.name == "mod" and not all(a.is_Number for a in args):
-        return sp.Mod(*args, evaluate=False)  # its evaluation takes polynomial gcds: minutes for a large power
-    if kind.name in ("abs", "sign") and not _known_real(args[0]):
+    sympy's Mod takes polynomial gcds, Max compares its arguments pairwise, abs introduces conjugates, a comparison of
+    constants evaluates them to any precision: minutes where someone wants them to be.
+    """
+    name = kind.name
+    if None not in constants and name in _BY_VALUE:
+        return _BY_VALUE[name](kind, args, constants)
+    if name in ("max", "min"):
+        return _extremum(kind, args, constants)
+    if name in ("mod", "floor", "ceiling") or name in RELATIONS:
+        return kind.cls(*args, evaluate=False)
+    if name in ("abs", "sign") and not bool(args[0].is_extended_real):
         return kind.cls(args[0], evaluate=False)
     return kind.cls(*args)
+
+
+def _by_order(kind: NodeKind, args: Sequence[sp.Basic], constants: Sequence[Any]) -> sp.Basic:
+    return args[constants.index(kind.value(*constants))]
+
+
+def _constant_mod(kind: NodeKind, args: Sequence[sp.Basic], constants: Sequence[Any]) -> sp.Basic:
+    if all(isinstance(a, sp.Rational) for a in args):
+        return sp.Mod(*args)
+    return sp.Float(kind.value(*constants))
+
+
+_BY_VALUE: dict[str, Callable[[NodeKind, Sequence[Any], Sequence[Any]], sp.Basic]] = {
+    **dict.fromkeys(RELATIONS, lambda kind, args, constants: sp.true if kind.value(*constants) else sp.false),
+    "max": _by_order,
+    "min": _by_order,
+    "mod": _constant_mod,
+    "floor": lambda kind, args, constants: sp.Integer(math.floor(constants[0])),
+    "sign": lambda kind, args, constants: sp.Integer(int(_sign(constants[0]))),
+    "abs": lambda kind, args, constants: -args[0] if constants[0] < 0 else args[0],
+}
+
+
+def _extremum(kind: NodeKind, args: Sequence[sp.Basic], constants: Sequence[Any]) -> sp.Basic:
+    """Max or Min: nested ones joined, repeated arguments dropped, of several constants only the one that counts."""
+    flat = [part for arg in args for part in (arg.args if kind_of(arg) is kind else (arg,))]
+    numbers = {part: float(part) for part in flat if not part.free_symbols and part.is_Number}
+    keep = kind.value(numbers, key=lambda part: numbers[part]) if numbers else None
+    parts = {part: None for part in flat if part not in numbers or part == keep}
+    if len(parts) > MAX_ALTERNATIVES:
+        raise ExpressionError(f"'{kind.name}' of '{kind.name}' has more than {MAX_ALTERNATIVES} arguments in all")
+    return next(iter(parts)) if len(parts) == 1 else kind.cls(*parts, evaluate=False)
 
 
 @dataclass
@@ -151,17 +198,21 @@ class Builder:
     """
 
     values: dict[sp.Basic, float | bool | None] = field(default_factory=dict)
+    sizes: dict[sp.Basic, int] = field(default_factory=dict)  # nodes below, of constants
+    powers: dict[sp.Basic, int] = field(default_factory=dict)  # powers in powers
 
     def build(self, name: str, args: Sequence[sp.Basic]) -> sp.Basic:
         """The node `name` of `args` (themselves built or checked here); ExpressionError where a check fails."""
         kind = KINDS[name]
         if len(args) < kind.fewest or (kind.most is not None and len(args) > kind.most):
-            raise ExpressionError(f"'{name}' takes {_arity(kind)}, not {len(args)}")
+            raise ExpressionError(f"'{name}' takes {arity(kind)}, not {len(args)}")
         self._check_types(kind, args)
         constants = [self.value(arg) for arg in args]
         if None not in constants:
-            _finite(kind, constants)
-        node = _construct(kind, args)
+            value = _finite(kind, constants)
+            if sum(self.sizes.get(arg, 1) for arg in args) > MAX_CONSTANT and not isinstance(value, bool):
+                return sp.Float(value)
+        node = _construct(kind, args, constants)
         self.value(node)
         return node
 
@@ -175,7 +226,15 @@ class Builder:
             if not _is_condition(condition):
                 raise ExpressionError("each condition of 'piecewise' must be a comparison, such as x > 0")
             self.value(value), self.value(condition)
-        node = sp.Piecewise(*pairs)
+        kept: list[tuple[sp.Basic, sp.Basic]] = []
+        for value, condition in pairs:
+            if condition is not sp.false:
+                kept.append((value, condition))
+            if condition is sp.true:
+                break
+        if not kept:
+            raise ExpressionError("no condition of 'piecewise' can hold")
+        node = kept[0][0] if kept[0][1] is sp.true else sp.Piecewise(*kept, evaluate=False)
         self.value(node)
         return node
 
@@ -198,8 +257,8 @@ class Builder:
             return float(node)
         if isinstance(node, sp.Float) or node is sp.pi or node is sp.E:
             number = float(node)
-            if not math.isfinite(number):
-                raise ExpressionError("a number is too large for double precision")
+            if not math.isfinite(number) or (number == 0 and not node.is_zero):
+                raise ExpressionError("a number is too large or too small for double precision")
             return number
         if node in (sp.oo, -sp.oo, sp.zoo, sp.nan):
             raise ExpressionError("a constant part of the expression is not finite")
@@ -211,12 +270,25 @@ class Builder:
         values = [self.value(arg) for arg in node.args]
         if isinstance(node, sp.Pow) and isinstance(node.exp, sp.Number) and abs(float(node.exp)) > MAX_EXPONENT:
             raise ExpressionError(f"an exponent is beyond {MAX_EXPONENT}")
+        self.powers[node] = max(self.powers.get(arg, 0) for arg in node.args) + isinstance(node, sp.Pow)
+        if self.powers[node] > MAX_POWERS:
+            raise ExpressionError(f"powers and quotients nest deeper than {MAX_POWERS} levels")
         if any(v is None for v in values) or isinstance(node, sp.Piecewise):
             return None
+        self.sizes[node] = 1 + sum(self.sizes.get(arg, 1) for arg in node.args)
+        if isinstance(node, TableFunction):
+            return self._tabulated(node, values)
         kind = kind_of(node)
         if kind is None:  # a function of constants that is not in the table: tree.py says which
             return None
         return _finite(kind, values)
+
+    @staticmethod
+    def _tabulated(node: TableFunction, values: Sequence[Any]) -> float:
+        result = float(node.table.evaluate(values[0]))
+        if not math.isfinite(result):
+            raise ExpressionError(f"the table '{node.table.name}' has no value at {values[0]:g}")
+        return result
 
     @staticmethod
     def _check_types(kind: NodeKind, args: Sequence[sp.Basic]) -> None:
@@ -232,7 +304,8 @@ def _is_condition(node: object) -> bool:
     return isinstance(node, sp.logic.boolalg.Boolean) and not isinstance(node, sp.Symbol)
 
 
-def _arity(kind: NodeKind) -> str:
+def arity(kind: NodeKind) -> str:
+    """How many arguments a node of this kind takes, in words."""
     if kind.most is None:
         return f"at least {kind.fewest} arguments"
     if kind.most == kind.fewest:
@@ -249,8 +322,9 @@ def _finite(kind: NodeKind, values: Sequence[Any]) -> float | bool:
     except OverflowError:
         raise ExpressionError("a constant part of the expression is too large for double precision") from None
     except ValueError:
-        shown = ", ".join(f"{v:.6g}" for v in values)
-        raise ExpressionError(f"{kind.name}({shown}) is not a finite real number") from None
+        shown = [f"{float(v):.6g}" for v in values]
+        call = f"({shown[0]})**({shown[1]})" if kind.name == "pow" else f"{kind.name}({', '.join(shown)})"
+        raise ExpressionError(f"{call} is not a finite real number") from None
     if isinstance(result, bool):
         return result
     if not math.isfinite(result):

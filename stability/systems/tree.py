@@ -25,6 +25,7 @@ import sympy as sp
 
 from ..errors import CompileError, ExpressionError, FileFormatError, InputError, unknown_name
 from .nodes import KINDS, Builder, kind_of, real_symbol, valid_name
+from .tables import Table, TableFunction
 
 __all__ = ["MAX_DEPTH", "MAX_NODES", "canonical", "canonical_bytes", "digest", "from_tree", "to_tree"]
 
@@ -123,8 +124,10 @@ def _rebuilt_function(node: sp.Basic, args: list[sp.Basic], builder: Builder) ->
     kind = kind_of(node)
     if kind is not None:
         return builder.build(kind.name, args)
-    if hasattr(node, "to_plain"):
-        return node.func(*args)
+    if isinstance(node, TableFunction):
+        result = node.func(*args)
+        builder.value(result)
+        return result
     rewrite = _REWRITES.get(type(node))
     if rewrite is not None:
         return _rebuild(rewrite(*args), None, builder, {}, 0)
@@ -164,23 +167,26 @@ def to_tree(expr: Any) -> Tree:
 
 def _tree(node: sp.Basic, memo: dict[sp.Basic, tuple[Tree, bytes, int]]) -> tuple[Tree, bytes, int]:
     """Tree, its canonical bytes (the sort key of commutative parents) and its number of nodes."""
-    if node in memo:
+    if node.args and node in memo:
         return memo[node]
     if isinstance(node, sp.Piecewise):
-        halves = [[_tree(part, memo) for part in pair.args] for pair in node.args]
-        tree: Tree = ["piecewise", *([part[0] for part in pair] for pair in halves)]
-        size = 1 + sum(part[2] for pair in halves for part in pair)
+        pairs = [[_tree(part, memo) for part in pair.args] for pair in node.args]
+        tree: Tree = ["piecewise", *([part[0] for part in pair] for pair in pairs)]
+        key = b'["piecewise",' + b",".join(b"[" + b",".join(part[1] for part in pair) + b"]" for pair in pairs) + b"]"
+        size = 1 + sum(part[2] for pair in pairs for part in pair)
     elif node.args:
         children = [_tree(arg, memo) for arg in node.args]
         kind = kind_of(node)
         if kind is not None and kind.commutative:
             children.sort(key=lambda child: child[1])
-        head = [kind.name] if kind is not None else ["table", node.to_plain()]
+        head = [kind.name] if kind is not None else ["table", node.table.to_dict()]
         tree = [*head, *(child[0] for child in children)]
+        key = canonical_bytes(head)[:-1] + b"," + b",".join(child[1] for child in children) + b"]"
         size = 1 + sum(child[2] for child in children)
     else:
         tree, size = _leaf_tree(node), 1
-    memo[node] = (tree, canonical_bytes(tree), size)
+        return tree, canonical_bytes(tree), size
+    memo[node] = (tree, key, size)
     return memo[node]
 
 
@@ -258,11 +264,18 @@ def _expression(tree: Any, builder: Builder) -> sp.Basic:
 
 
 def _table(entries: list[Any], builder: Builder) -> sp.Basic:
-    from .tables import table_from_plain
-
-    if len(entries) < 2 or not isinstance(entries[0], dict):
-        raise FileFormatError("'table' needs its data and an argument")
-    return table_from_plain(entries[0], *(_expression(entry, builder) for entry in entries[1:]))
+    if len(entries) != 2 or not isinstance(entries[0], dict) or not valid_name(entries[0].get("name")):
+        raise FileFormatError("'table' needs its data (with a plain name) and one argument")
+    argument = _expression(entries[1], builder)
+    if not isinstance(argument, sp.Expr):
+        raise ExpressionError("a table takes a number, not a comparison")
+    try:
+        table = Table.from_dict(entries[0])
+    except (InputError, TypeError, ValueError, KeyError) as error:
+        raise FileFormatError(f"damaged table data: {error}") from None
+    node = table(argument)
+    builder.value(node)
+    return node
 
 
 def _symbol(entries: list[Any]) -> sp.Basic:
