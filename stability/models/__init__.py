@@ -50,11 +50,20 @@ _MODELS: dict[str, str] = {
 
 # springs, magnets and other public things that are no models
 _OTHERS: dict[str, str] = {
+    "BlockMagnet": "_magnets",
     "Coil": "_builder",
+    "DipoleMagnetSpring": "_magnet_one_sided",
+    "DiscMagnet": "_magnets",
+    "LevitatedMagnetSpring": "_magnet_springs",
+    "MagnetPair": "_magnet_pairs",
+    "NestedRingSpring": "_magnet_springs",
+    "OneSidedMagnetSpring": "_magnet_one_sided",
     "ParallelSprings": "_spring_sums",
     "PiecewiseSpring": "_spring_pieces",
     "PolynomialSpring": "_spring_laws",
     "PowerLawSpring": "_spring_laws",
+    "RingMagnet": "_magnets",
+    "RotationalMagneticSpring": "_magnet_rotational",
     "Spring": "_springs",
     "TabulatedSpring": "_spring_tables",
     "UnilateralSpring": "_spring_pieces",

@@ -104,7 +104,7 @@ class PiecewiseSpring(Spring):
         return tuple(float(_poly.polyval(b, right) - _poly.polyval(b, left)) for b, left, right in sides)
 
     @cached_property
-    def odd(self) -> bool:  # type: ignore[override]
+    def odd(self) -> bool:
         if any(a != -b for a, b in zip(self.breakpoints, reversed(self.breakpoints))):
             return False
         signs = [np.array([c * (-1.0) ** (j + 1) for j, c in enumerate(piece)]) for piece in reversed(self.pieces)]
@@ -147,7 +147,7 @@ class PiecewiseSpring(Spring):
         return self._evaluate(q, [_poly.polyder(piece) for piece in self.pieces])
 
     @cached_property
-    def equilibria(self) -> tuple[float, ...]:  # type: ignore[override]
+    def equilibria(self) -> tuple[float, ...]:
         ends = (-math.inf, *self.breakpoints, math.inf)
         near = 1e-12 * self.length_scale  # round-off of a zero that lies on a breakpoint
         found = [b for b, jump in zip(self.breakpoints, self.jumps) if self._straddles(b, jump)]

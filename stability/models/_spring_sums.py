@@ -95,7 +95,7 @@ class ParallelSprings(Spring):
         return np.sum([s.stiffness(q) for s in self.springs], axis=0)[()]
 
     @cached_property
-    def equilibria(self) -> tuple[float, ...]:  # type: ignore[override]
+    def equilibria(self) -> tuple[float, ...]:
         """Sign changes of the force on a grid of 0.5 % steps (pairs of equilibria closer than that are not seen)."""
         low, high = self.domain
         scales = [s.length_scale for s in self.springs]

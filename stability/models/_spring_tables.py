@@ -126,7 +126,7 @@ class TabulatedSpring(OpaqueSpring):
         _ = self.force_table
 
     @cached_property
-    def force_table(self) -> Table:  # type: ignore[override]
+    def force_table(self) -> Table:
         from ..systems.tables import Table
 
         return Table.from_samples(self.name, self.displacements, self.forces, method=self.method)
@@ -154,7 +154,7 @@ class TabulatedSpring(OpaqueSpring):
         return self.force_table.evaluate(self._inside(q), 1)
 
     @cached_property
-    def equilibria(self) -> tuple[float, ...]:  # type: ignore[override]
+    def equilibria(self) -> tuple[float, ...]:
         q = np.array(self.displacements)
         fine = q[:-1, None] + np.diff(q)[:, None] * np.arange(4) / 4.0  # quintic pieces may turn
         return crossings(self.force, np.append(fine.ravel(), q[-1]))
