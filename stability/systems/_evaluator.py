@@ -186,7 +186,7 @@ class Evaluator:
             try:
                 parameters = _view(P, N, m) if stride else _view(P, 1, m)[0]
                 self._run(which, _view(phase, N, 1)[:, 0] if phase else None, _view(X, N, n), parameters, (), outputs)
-            except Exception as error:  # whatever a user's function raises must not enter C
+            except Exception as error:  # noqa: BLE001 - whatever a user's function raises must not enter C
                 self.callback_error = error
                 for output in outputs:
                     output[:] = np.nan

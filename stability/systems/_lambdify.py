@@ -80,9 +80,10 @@ class _Printer(NumPyPrinter):
         argument = self._print(node.args[0])
         return f"(({argument}) - floor({argument}))"
 
-    def _print_TableFunction(self, node: TableFunction) -> str:
-        name = self.tables.setdefault(node.table, f"table_{len(self.tables)}")
-        return f"{name}({self._print(node.args[0])})"
+    def _print(self, expr: Any, **options: Any) -> str:
+        if isinstance(expr, TableFunction):  # before the dispatch by class name: a user may call a table "sin"
+            return f"{self.tables[expr.table]}({self._print(expr.args[0])})"
+        return str(super()._print(expr, **options))
 
     def _print_PowerLog(self, node: sp.Expr) -> str:
         return f"power_log({', '.join(self._print(a) for a in node.args)})"

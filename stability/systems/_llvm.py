@@ -5,8 +5,8 @@ One C function per program, the loop over the points inside:
     void f(int64 N, const double *phase, const double *X, const double *P, int64 pstride, <inputs>, <outputs>)
 
 with X (N, n), inputs (N, n + m) and three or more outputs, row-major per point; parameters of point k at P + k*pstride
-(pstride 0: shared). Arrays that the program does not read may be null. All inputs of a point are read before its outputs are
-written. No fast-math flags anywhere: NaN stays NaN, and the order of operations is that of the expression.
+(pstride 0: shared). Arrays that the program does not read may be null. All inputs of a point are read before its
+outputs are written. No fast-math flags anywhere: NaN stays NaN, and the order of operations is the expression's.
 
 Elementary functions are calls into the C mathematics library under an own prefix (`stability_sin`, ...). Integer powers
 up to 64 are products by repeated squaring, half-integer ones a product with a square root, all others calls of `pow`.

@@ -31,7 +31,8 @@ def test_derivative_against_high_precision_difference(expression):
     function = sp.lambdify((x, y), expression, "mpmath")
     for px, py in [(0.61, 0.27), (-0.83, 0.41), (0.35, -1.2)]:
         with mpmath.workdps(40):
-            truth = float(mpmath.diff(lambda a, b=py: function(a, mpmath.mpf(b)), mpmath.mpf(px), h=mpmath.mpf(10) ** -15))
+            at, step = mpmath.mpf(px), mpmath.mpf(10) ** -15
+            truth = float(mpmath.diff(lambda a, b=py: function(a, mpmath.mpf(b)), at, h=step))
         value = float(numpy_function([x, y], [differentiate(expression, x)])(px, py)[0])
         assert value == pytest.approx(truth, rel=1e-12, abs=1e-12)
 
@@ -116,10 +117,18 @@ def test_table_chain_rule():
     assert differentiate(table(y), x) == 0
 
 
+def test_a_table_may_have_the_name_of_a_function():
+    """A user's table called "floor" or "sin" is that table, not the function."""
+    for name in ("floor", "sin", "Abs"):
+        table = Table(name, [0.0, 1.0], [[1.0, 2.0]])
+        assert value_at(table(x), x=0.25) == 1.5
+        assert value_at(differentiate(table(x), x), x=0.25) == 2.0
+
+
 def test_unknown_functions_are_named():
     with pytest.raises(CompileError, match="mystery"):
         differentiate(sp.Function("mystery")(x), x)
-    with pytest.raises(CompileError, match="airyai|Integral|has no"):
+    with pytest.raises(CompileError, match="Integral"):
         differentiate(sp.Integral(sp.sin(x * y), (y, 0, 1)), x)
 
 
