@@ -16,13 +16,18 @@ _EXPORTS: dict[str, str] = {
     "ConstantAcceleration": "systems.excitation",
     "ConstantAmplitude": "systems.excitation",
     "Criticality": "words",
+    "Crossing": "words",
     "HardStop": "systems.stops",
     "Kind": "words",
     "mathieu_a": "floquet.mathieu",
+    "mathieu_a_of_exponent": "floquet.exponents",
     "mathieu_b": "floquet.mathieu",
+    "mathieu_exponent": "floquet.exponents",
     "Status": "words",
     "System": "systems.system",
     "Verdict": "words",
+    "linear_response": "charting.transfer",
+    "LinearResponse": "charting.transfer",
 }
 
 # submodules that are themselves public

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 
-__all__ = ["Criticality", "Kind", "Status", "Verdict"]
+__all__ = ["Criticality", "Crossing", "Kind", "Status", "Verdict"]
 
 
 class Verdict(StrEnum):
@@ -77,6 +77,14 @@ _LABELS = {
     Kind.GENERALIZED_PERIOD_DOUBLING: "GPD",
     Kind.CHENCINER: "CH",
 }
+
+
+class Crossing(StrEnum):
+    """Where the largest Floquet multiplier of an unstable solution left the unit circle."""
+
+    PLUS_ONE = "+1"
+    MINUS_ONE = "-1"
+    PAIR = "pair"
 
 
 class Criticality(StrEnum):
