@@ -43,6 +43,7 @@ def test_python_blocks_run(page: Path, tmp_path: Path, monkeypatch: pytest.Monke
     namespace: dict[str, object] = {"__name__": "page"}
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", category=DeprecationWarning, module=r"(?!stability)")  # between others
         for line, code in blocks(page, "python"):
             exec(compile("\n" * (line - 1) + code, str(page), "exec"), namespace)  # noqa: S102
 

@@ -25,6 +25,7 @@ def test_figure(script: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setitem(sys.modules, specification.name, module)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", category=DeprecationWarning, module=r"(?!stability)")  # between others
         specification.loader.exec_module(module)
         for part in ("compute", "check", "draw", "main"):
             assert callable(getattr(module, part, None)), f"{script.name} has no {part}()"

@@ -34,7 +34,7 @@ def test_imports_point_down_only() -> None:
     """The import contract of pyproject.toml, by import-linter."""
     program = "import sys; from importlinter.cli import lint_imports_command as c; sys.exit(c())"
     run = subprocess.run(
-        [sys.executable, "-c", program, "--no-cache", "--no-logo"],
+        [sys.executable, "-c", program, "--no-cache"],
         cwd=ROOT, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": str(ROOT), "PYTHONUTF8": "1"},
     )  # fmt: skip
     assert run.returncode == 0, run.stdout + run.stderr
