@@ -19,6 +19,8 @@ _EXPORTS: dict[str, str] = {
     "Crossing": "words",
     "HardStop": "systems.stops",
     "Kind": "words",
+    "load": "results.storage",
+    "load_model": "systems.textfile",
     "mathieu_a": "floquet.mathieu",
     "mathieu_a_of_exponent": "floquet.exponents",
     "mathieu_b": "floquet.mathieu",

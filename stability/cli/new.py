@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import click
@@ -18,18 +19,20 @@ from ._console import Console, as_json_option
 def command(console: Console, file: Path, force: bool) -> None:
     """Write a commented template of a model as text to FILE (.toml)."""
     check_outputs([file], [".toml"], force)
+    from ..systems.textfile import template
+
+    text = template(_model_name(file.stem))
     with replacing(file) as temporary:
-        temporary.write_text(template(file.stem), encoding="utf-8")
-    console.say(f"wrote {file}: a pendulum on a spring that is shaken; edit it, then")
+        temporary.write_text(text, encoding="utf-8")
+    console.say(f"wrote {file}: a Duffing oscillator; edit it, then")
     console.table([
         (f"stability models {file}", "shows the equations of motion that come out of it"),
-        (f"stability chart {file} --x Omega:0.5:1.5 --y F:0:0.1 --about linear", "draws its instability tongues"),
+        (f"stability chart {file} --about linear --x Omega:0.2:2.5 --y F:0:2", "charts its linear response"),
     ])
     console.result({"written": str(file)})
 
 
-def template(name: str) -> str:
-    """The template's text, with the model's name filled in."""
-    from ..systems.textfile import template as text
-
-    return text(name)
+def _model_name(stem: str) -> str:
+    """The file's name as a name of a model: letters, digits and single underscores, a letter first."""
+    name = re.sub(r"[^A-Za-z0-9]+", "_", stem).strip("_")
+    return name if name[:1].isalpha() else f"model_{name}".rstrip("_")

@@ -108,6 +108,12 @@ def test_new_writes_a_template_that_works(
     assert json.loads(capsys.readouterr().out)["name"] == "my_oscillator"
 
 
+@pytest.mark.parametrize("name", ["my-oscillator", "2dof", "a__b", "Ünder", "___"])
+def test_new_makes_a_model_name_of_any_file_name(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", f"{name}.toml"]) == 0 and main(["models", f"{name}.toml"]) == 0
+
+
 def test_new_never_overwrites_unasked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "mine.toml"
