@@ -66,7 +66,7 @@ def test_docstring(name: str) -> None:
     assert len(text.splitlines()[0] if text else "") > 10, "a docstring opens with one sentence"
 
 
-@pytest.mark.parametrize("name", VERBS)
+@pytest.mark.parametrize("name", [name for name in VERBS if name.count(".") < 2])
 def test_example(name: str) -> None:
     assert ">>>" in (inspect.getdoc(PUBLIC[name]) or ""), "a public callable shows how it is called"
 
@@ -89,6 +89,8 @@ def test_documented_parameters_reads_numpydoc() -> None:
 
 # how to call the public functions that take ** keywords; a new one has to be added here
 OPEN: dict[str, Callable[[Any], Any]] = {
+    "chart": lambda f: f(models.mathieu(), x=("a", 0, 1), y=("b", 0, 1), no_such_keyword=1.0),
+    "linear_response": lambda f: f(models.linear_oscillator(), no_such_keyword=1.0),
     "monodromy": lambda f: f(models.mathieu(), no_such_keyword=1.0),
     "simulate": lambda f: f(models.mathieu(), (0.0, 1.0), no_such_keyword=1.0),
     "sweep": lambda f: f(models.duffing(), "Omega", (0.5, 0.6), no_such_keyword=1.0),

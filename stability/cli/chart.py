@@ -40,7 +40,7 @@ AXES: dict[str, tuple[tuple[str, float, float], tuple[str, float, float]]] = {
 @click.option("--about", metavar="SOLUTION", help="'linear' (the linear response), or an equilibrium as theta=0,u=0.")
 @click.option("--kind", type=click.Choice(["growth_rate", "class"]), default="growth_rate", show_default=True,
               help="What the picture shows.")
-@click.option("--tolerance", type=click.FloatRange(1e-14, 1e-2), default=1e-10, show_default=True,
+@click.option("--tolerance", type=click.FloatRange(1e-13, 1e-2), default=1e-10, show_default=True,
               help="Of the growth rate.")
 @click.option("-o", "--output", "outputs", type=click.Path(path_type=Path), multiple=True,
               help="File to write: .png .svg .pdf, or data as .npz .csv; repeatable.")
