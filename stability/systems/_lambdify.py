@@ -25,7 +25,7 @@ RECIPROCALS = {"sec": "cos", "csc": "sin", "cot": "tan", "sech": "cosh", "csch":
 SUPPORTED = frozenset(
     {"Add", "Mul", "Pow", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh"}
     | {"asinh", "acosh", "atanh", "Abs", "sign", "Heaviside", "Max", "Min", "Mod", "floor", "ceiling", "frac"}
-    | {"Piecewise", "ExprCondPair", "And", "Or", "Not", "StrictLessThan", "LessThan", "Equality"}
+    | {"Piecewise", "ExprCondPair", "And", "Or", "Not", "ITE", "StrictLessThan", "LessThan", "Equality"}
     | {"StrictGreaterThan", "GreaterThan", "Unequality", "PowerLog", "TableFunction", *RECIPROCALS}
 )
 
@@ -60,6 +60,9 @@ class _Printer(NumPyPrinter):
 
     def _print_Or(self, node: sp.Or) -> str:
         return self._pairwise("logical_or", node.args)
+
+    def _print_ITE(self, node: sp.ITE) -> str:
+        return f"where({', '.join(self._print(a) for a in node.args)})"
 
     def _print_Piecewise(self, node: sp.Piecewise) -> str:
         text = "nan"

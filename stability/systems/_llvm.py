@@ -46,7 +46,7 @@ COMPARISONS = {
 }
 MAX_PRODUCT_POWER = 64
 OUTPUTS = 3  # the least number of output arguments: F, FJ and FJP have one C signature
-CONNECTIVES = ("And", "Or", "Not")
+CONNECTIVES = ("And", "Or", "Not", "ITE")
 Register = str
 
 
@@ -315,6 +315,8 @@ done:
         parts = [self.condition(a) for a in node.args]
         if name == "Not":
             return self.line(f"xor i1 {parts[0]}, true")
+        if name == "ITE":
+            return self.line(f"select i1 {parts[0]}, i1 {parts[1]}, i1 {parts[2]}")
         if name not in ("And", "Or"):
             raise CompileError(f"the condition '{name}' has no machine code; use comparisons, And, Or, Not")
         result = parts[0]

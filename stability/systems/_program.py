@@ -21,6 +21,7 @@ from functools import cached_property
 from typing import Any
 
 import sympy as sp
+from sympy.core.relational import Relational
 
 from ..errors import EquationError
 from .expressions import PowerLog, differentiate
@@ -175,7 +176,7 @@ def share(expressions: Sequence[sp.Expr], prefix: str = "r_") -> tuple[list[Assi
 def _with_args(node: sp.Basic, args: tuple[sp.Basic, ...]) -> sp.Basic:
     if args == node.args:
         return node
-    if isinstance(node, (sp.Piecewise, sp.Mod)):  # their evaluation compares and factors: slow, and no gain here
+    if isinstance(node, (sp.Piecewise, sp.Mod, Relational)):  # evaluation would compare and factor: slow, no gain
         return node.func(*args, evaluate=False)
     if isinstance(node, (sp.Abs, sp.sign)) and not args[0].is_extended_real:
         return node.func(*args, evaluate=False)

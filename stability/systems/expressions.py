@@ -166,7 +166,8 @@ def _selection(node: sp.Expr, symbol: sp.Symbol, memo: Memo) -> sp.Expr:
     wins = sp.Ge if isinstance(node, sp.Max) else sp.Le
     pairs = []
     for i, (argument, slope) in enumerate(zip(node.args[:-1], slopes[:-1], strict=True)):
-        pairs.append((slope, sp.And(*(wins(argument, other) for other in node.args[i + 1 :]))))
+        tests = [wins(argument, other, evaluate=False) for other in node.args[i + 1 :]]
+        pairs.append((slope, tests[0] if len(tests) == 1 else sp.And(*tests, evaluate=False)))
     return sp.Piecewise(*pairs, (slopes[-1], True), evaluate=False)
 
 

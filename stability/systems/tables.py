@@ -113,9 +113,10 @@ class Table:
         piece = np.searchsorted(breaks[:-1], x, side="right") + (x > breaks[-1])
         piece = np.where(np.isnan(x), 0, piece)
         distance = x - breaks[np.maximum(piece - 1, 0)]
-        value = rows[piece, -1] + 0.0 * distance  # a constant piece, too, must pass NaN on
-        for j in range(rows.shape[1] - 2, -1, -1):
-            value = value * distance + rows[piece, j]
+        with np.errstate(all="ignore"):  # NaN and infinity pass through, as in machine code
+            value = rows[piece, -1] + 0.0 * distance  # a constant piece, too, must pass NaN on
+            for j in range(rows.shape[1] - 2, -1, -1):
+                value = value * distance + rows[piece, j]
         return value
 
     def derivative(self, order: int = 1) -> Table:
