@@ -1,0 +1,53 @@
+"""Calling a compiled vector field by its address from inside a kernel.
+
+The field is one C function for all points of a discretisation,
+
+    void field(int64 N, const double* phase, const double* X, const double* P, int64 pstride,
+               double* F, double* J, double* Fp)
+
+with X (N, n), F (N, n), J (N, n, n) = dF/dx and Fp (N, n, m) = dF/dp at fixed phase, all C-contiguous; P is (m,) with
+``pstride = 0`` or (N, m) with ``pstride = m``. A forcing period T(p) is a field of one state that does not depend on
+it: F = T, Fp = dT/dp. Because an address is an ordinary integer argument, kernels are compiled once for all models and
+cached on disk.
+
+A wrong address or shape is a crash, not an exception: sizes are validated in Python before a kernel is entered, and
+the owner of the machine code must be kept alive as long as its address is used.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+__all__ = ["call_field"]
+
+_DOUBLE = ir.DoubleType()
+_INT64 = ir.IntType(64)
+
+
+def _data(context: Any, builder: Any, array_type: Any, value: Any) -> Any:
+    """The data pointer of a numba array value."""
+    return context.make_array(array_type)(context, builder, value=value).data
+
+
+def _function(builder: Any, address: Any, arguments: list[Any]) -> Any:
+    """The function pointer behind an integer address."""
+    return builder.inttoptr(address, ir.FunctionType(ir.VoidType(), arguments).as_pointer())
+
+
+@intrinsic
+def call_field(typingctx, address, count, phase, X, P, stride, F, J, Fp):  # type: ignore[no-untyped-def]
+    """``field(count, phase, X, P, stride, F, J, Fp)`` at an integer address, on float64 C-contiguous arrays."""
+    signature = types.void(types.int64, types.int64, phase, X, P, types.int64, F, J, Fp)
+
+    def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        pointer = _DOUBLE.as_pointer()
+        call = _function(builder, args[0], [_INT64, pointer, pointer, pointer, _INT64, pointer, pointer, pointer])
+        data = [_data(context, builder, sig.args[k], args[k]) for k in (2, 3, 4, 6, 7, 8)]
+        builder.call(call, [args[1], data[0], data[1], data[2], args[5], data[3], data[4], data[5]])
+        return context.get_dummy_value()
+
+    return signature, codegen

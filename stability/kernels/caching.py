@@ -1,0 +1,76 @@
+"""Guarded on-disk caching of compiled kernels.
+
+numba keeps compiled functions in an index file and one data file per signature. A damaged entry (a full disk, a killed
+process, a copied home directory) makes numba raise from the middle of a call, or even from an import. Here a kernel that
+cannot be loaded from its cache has the cache files deleted and is compiled again; if the cache directory cannot be
+written, the kernel is compiled without a cache. A kernel is therefore never lost to its cache: it only becomes slower
+to get.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import os
+from collections.abc import Callable
+from typing import Any
+
+import numba
+from numba.core.caching import FunctionCache
+
+__all__ = ["kernel"]
+
+_EVERYTHING_A_DAMAGED_FILE_RAISES = (
+    EOFError, OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, ImportError, RuntimeError, MemoryError,
+)  # fmt: skip
+
+
+class _GuardedCache(FunctionCache):
+    """numba's function cache; a damaged entry is removed and treated as absent."""
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except _EVERYTHING_A_DAMAGED_FILE_RAISES + _unpickling_errors():
+            self.remove()
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        try:
+            super().save_overload(sig, data)
+        except _EVERYTHING_A_DAMAGED_FILE_RAISES + _unpickling_errors():
+            self.remove()
+            with contextlib.suppress(*_EVERYTHING_A_DAMAGED_FILE_RAISES):
+                super().save_overload(sig, data)
+
+    def remove(self) -> None:
+        """Delete this function's index and data files."""
+        folder, prefix = self._impl.locator.get_cache_path(), self._impl.filename_base
+        with contextlib.suppress(OSError):
+            for name in os.listdir(folder):
+                if name.startswith(prefix + ".") or name.startswith(prefix + "-"):
+                    with contextlib.suppress(OSError):
+                        os.unlink(os.path.join(folder, name))
+
+
+@functools.cache
+def _unpickling_errors() -> tuple[type[Exception], ...]:
+    import pickle
+
+    return (pickle.UnpicklingError,)
+
+
+def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) -> Any:
+    """Decorator: a compiled kernel with a guarded disk cache (`error_model="numpy"`: division by zero gives inf or nan).
+
+    `inline=True` is for small functions that are only called by other kernels: no cache file of their own.
+    """
+    if function is None:
+        return functools.partial(kernel, inline=inline)
+    dispatcher = numba.njit(
+        error_model="numpy", nogil=True, boundscheck=False, no_cfunc_wrapper=True, no_cpython_wrapper=inline
+    )(function)
+    if not inline:
+        with contextlib.suppress(*_EVERYTHING_A_DAMAGED_FILE_RAISES):
+            dispatcher._cache = _GuardedCache(function)
+    return dispatcher

@@ -1,0 +1,409 @@
+r"""Periodic orbits by Gauss collocation with condensation: `Collocation`.
+
+    x' = sigma f(phase, x, p) on s in [0, 1],      x(1) = S x(0) + w,      sigma = span T,
+
+forced systems: T = T(p) is the forcing period, phase = frac(span s), span = k for orbits of k forcing periods (k/2 where
+x(t + k T/2) = S x(t)); autonomous systems: T is the orbit's own period, an unknown, with an integral phase condition.
+Polynomials of degree m on N intervals through the Gauss points (order 2m at the nodes); each Newton solve is one
+compiled call (kernels/condensation_newton.py), from which the tangent, the determinant sign and the monodromy matrix
+fall out. The error is estimated by one Newton step at degree m + 1 from the same orbit, which gives the change of the
+nodes, of the period and of the multipliers; the mesh follows it (`adapt`).
+
+Inner product: time average of the states over their squared scales (+ the period's part); the stages are Gauss nodes,
+so it is an exact quadrature. Reference: Ascher, Mattheij, Russell (1995), *Numerical Solution of Boundary Value
+Problems for Ordinary Differential Equations*, chapters 5, 7, 9.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from ..kernels import condensation_newton as kernels
+from ..kernels.meshes import uniform_edges
+from ..protocols import Corrected, Critical, Seed, Spectrum, Tangent
+from ..results.solutions import PeriodicOrbit
+from ..words import Kind
+from .collocation_linearisation import CollocationLinearisation, Workspace
+from .orbit_field import OrbitField
+from .orbit_adaption import adapted
+from .orbit_measures import orbit_measures, orbit_view
+from .orbit_mesh import OrbitMesh
+from .orbit_starts import discretised, doubled_problem, started
+from .orbit_spectrum import deflated, eigenvalues, orbit_spectrum, spectrum_distance
+
+__all__ = ["Collocation"]
+
+Array = np.ndarray
+_CRITICAL = Critical(circle=True, pair=Kind.NEIMARK_SACKER, minus=-1.0)
+_MAX_ITERATIONS = {0: 30, 1: 8}  # without and with a tangent
+_NOTES = {kernels.NO_CONVERGENCE: "no convergence", kernels.SINGULAR: "singular"}
+_MAX_INTERVALS = 1000
+
+
+@dataclass(frozen=True, eq=False)
+class Collocation:
+    """Periodic orbits of a system, forced or autonomous, as a continuation problem.
+
+    Parameters
+    ----------
+    system : System
+    degree : int
+        Polynomial degree m on each interval, 1 to 11.
+    intervals : int
+        Number of mesh intervals to start with, and the smallest that `adapt` goes back to.
+    multiple : int
+        Orbits of k forcing periods (a doubled orbit: 2). Autonomous systems: leave it at 1.
+    winding : mapping of angle -> whole number of turns per orbit, or array (n,) in radians
+        x(end) = x(0) + 2 pi k for the angles a system declares.
+    symmetry : (n, n) array, optional
+        S of x(t + k T/2) = S x(t): the orbit is solved on half of its period.
+    accuracy : float
+        Wanted error of the nodes over the states' scales; `adapt` chooses the number of intervals for it.
+    adaptive : bool
+        False keeps mesh and scales as they are.
+    edges, scales, period_scale : arrays and number, optional
+        Mesh in s (N + 1,), sizes of the states (n,) and of the period; by default uniform, 1 and 1, set by `adapt`.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        Before any computation.
+
+    Examples
+    --------
+    >>> import stability as st
+    >>> problem = st.Collocation(st.models.duffing(xi=0.02, beta=0.001, Omega=0.5))
+    >>> p = problem.system.parameter_vector()
+    >>> orbit = problem.view(problem.start(p), p)
+    >>> round(orbit.max["u"], 4)
+    0.3332
+    """
+
+    system: Any
+    degree: int = 5
+    intervals: int = 20
+    multiple: int = 1
+    winding: Any = None
+    symmetry: Any = None
+    accuracy: float = 1e-9
+    adaptive: bool = True
+    edges: Any = None
+    scales: Any = None
+    period_scale: float = 1.0
+    _memo: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        n = self.system.n
+        for name, low, high in (("degree", 1, 11), ("intervals", 1, _MAX_INTERVALS), ("multiple", 1, 64)):
+            value = getattr(self, name)
+            if isinstance(value, bool) or int(value) != value or not low <= value <= high:
+                raise InputError(f"{name} = {value!r}: a whole number from {low} to {high} is needed")
+            object.__setattr__(self, name, int(value))
+        if not self.accuracy > 0:
+            raise InputError(f"accuracy = {self.accuracy!r}: a positive number is needed (1e-9 is the default)")
+        symmetric = self.symmetry is not None
+        object.__setattr__(self, "span", self.multiple * (0.5 if symmetric else 1.0))
+        matrix = np.eye(n) if not symmetric else np.asarray(self.symmetry, float)
+        if matrix.shape != (n, n) or not abs(np.linalg.det(matrix)) > 1e-12:
+            raise InputError(f"symmetry must be a regular ({n}, {n}) matrix, got shape {matrix.shape}")
+        scales = np.ones(n) if self.scales is None else np.array(self.scales, float)
+        if scales.shape != (n,) or not (scales > 0).all():
+            raise InputError(f"scales must be {n} positive numbers, got {self.scales!r}")
+        if self.edges is None:
+            edges = uniform_edges(self.intervals, self.break_points(self.system.parameter_vector()))
+        else:
+            edges = np.array(self.edges, float)
+            if edges.ndim != 1 or len(edges) < 2 or not (np.diff(edges) > 0).all() or edges[0] != 0 or edges[-1] != 1:
+                raise InputError("edges must ascend from 0 to 1")
+        for name, value in (("symmetry", matrix), ("scales", scales), ("edges", edges)):
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "winding", self._winding_vector())
+        own = 0 if self.flow.forced else 1
+        object.__setattr__(self, "mesh", OrbitMesh(edges, self.degree, n, self.span, own))
+
+    def _winding_vector(self) -> Array:
+        states, given = self.system.states, self.winding
+        if given is None:
+            return np.zeros(len(states))
+        if isinstance(given, Mapping):
+            out = np.zeros(len(states))
+            for name, turns in given.items():
+                if name not in self.system.angles:
+                    raise unknown_name("angle", name, self.system.angles, "the system")
+                out[states.index(name)] = 2 * np.pi * float(turns)
+            return out
+        out = np.array(given, float)
+        if out.shape != (len(states),):
+            raise InputError(f"winding must be a mapping angle -> turns or {len(states)} numbers, got {given!r}")
+        return out
+
+    def break_points(self, params: Array) -> Array:
+        """Breaks of the forcing at `params` as points s of the orbit, ascending, in [0, 1)."""
+        breaks = self.flow.breaks(params)
+        points = (breaks[:, None] + np.arange(np.ceil(self.span))).ravel() / self.span
+        return np.asarray(np.sort(points[points < 1 - 1e-12]))
+
+    @property
+    def halved(self) -> bool:
+        """Whether the orbit is solved on half of its period."""
+        return self.mesh.span != self.multiple
+
+    # ------------------------------------------------------------------ what the problem is
+    mesh: OrbitMesh = field(init=False, repr=False)
+    span: float = field(init=False, repr=False)
+
+    @cached_property
+    def flow(self) -> OrbitField:
+        """The compiled field of the system and its forcing period."""
+        return OrbitField.of(self.system)
+
+    @property
+    def evaluations(self) -> Any:
+        """The evaluator of the system."""
+        return self.flow.evaluations
+
+    @property
+    def kept(self) -> Array:
+        """State indices that enter the factorisation (see kernels/condensation.py)."""
+        return self.flow.kept
+
+    @property
+    def position(self) -> Array:
+        """For each kept state the state whose derivative it is, or -1."""
+        return self.flow.position
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Those of the system."""
+        return self.system.parameters
+
+    @property
+    def critical(self) -> Critical:
+        """Multipliers leave at +1, -1 or as a pair."""
+        return _CRITICAL
+
+    def index(self, name: str) -> int:
+        """Place of a parameter in p."""
+        if name not in self.flow.places:
+            raise unknown_name("parameter", name, self.parameters)
+        return self.flow.places[name]
+
+    @cached_property
+    def quadrature(self) -> Array:
+        """(N, mn) weights of the inner product at the stages."""
+        return self.mesh.quadrature(self.scales)
+
+    @cached_property
+    def weights(self) -> Array:
+        """(N,) of the inner product: zero at the nodes."""
+        nodes = np.zeros((self.mesh.intervals + 1, self.mesh.n))
+        return self.mesh.join(nodes, self.quadrature, self.period_scale**-2)
+
+    @property
+    def spec(self) -> Mapping[str, Any]:
+        """Plain data from which `from_spec` makes an equal problem."""
+        own = {
+            "problem": "Collocation",
+            "degree": self.degree,
+            "intervals": self.intervals,
+            "multiple": self.multiple,
+            "winding": self.winding.tolist(),
+            "symmetry": self.symmetry.tolist() if self.halved else None,
+            "accuracy": self.accuracy,
+            "adaptive": self.adaptive,
+            "edges": self.edges.tolist(),
+            "scales": self.scales.tolist(),
+            "period_scale": self.period_scale,
+        }
+        if self.system.function is not None:
+            return {**own, "view_only": True}
+        return {**own, "system": self.system.to_dict()}
+
+    @classmethod
+    def from_spec(cls, spec: Mapping[str, Any]) -> Collocation:
+        """The problem of a stored description."""
+        from ..systems.system import System
+
+        fields = {k: v for k, v in spec.items() if k not in ("problem", "system")}
+        return cls(System.from_dict(spec["system"]), **fields)
+
+    # ------------------------------------------------------------------ the Newton solve
+    def correct(
+        self, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
+    ) -> Corrected:
+        """The bordered Newton solve of `protocols.Problem`, in one compiled call."""
+        return self._newton(self.mesh, u, params, self.index(free), tangent, ds, tolerance, None)
+
+    def _newton(
+        self, mesh: OrbitMesh, u: Array, params: Array, index: int, tangent: Tangent | None, ds: float,
+        tolerance: float, limit: int | None,
+    ) -> Corrected:  # fmt: skip
+        u, params = np.array(u, float), np.array(params, float)
+        nodes, stages, rest = mesh.split(u)
+        work = Workspace(mesh, len(params), len(self.kept))
+        work.T[:] = rest if mesh.own else 0.0
+        arc = 0 if tangent is None else 1
+        t_nodes, t_stages, t_rest = mesh.split(u if tangent is None else tangent.u)
+        t_T = float(t_rest[0]) if mesh.own and arc else 0.0
+        t_l, weight = (0.0, 0.0) if tangent is None else (float(tangent.parameter), float(tangent.weight))
+        weights = self.quadrature if mesh is self.mesh else mesh.quadrature(self.scales)
+        rule, weight_T = mesh.rule, self.period_scale**-2 * mesh.own
+        status, iterations, residual, sign, du, dY, dl, t_period, t_parameter = kernels.newton(
+            self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.matrix,
+            rule.row_sums, rule.update, self.kept, self.position, self.symmetry, self.winding, self.scales, weights,
+            weight_T, params, index, nodes, stages, work.T, arc, t_nodes, t_stages, t_T, t_l, weight, float(ds),
+            float(tolerance), limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU, work.pivots,
+            work.Z, work.M,
+        )  # fmt: skip
+        rest[:] = work.T[: mesh.own]
+        if status != kernels.CONVERGED:
+            note = _NOTES.get(status) or self._not_finite(mesh, work)
+            return Corrected(u, params, None, float(residual), iterations, 0, None, False, note)
+        before, before_p = u - mesh.join(du[0], dY[0], dl[0, : mesh.own]), params.copy()
+        if mesh.own:
+            work.T[0] = before[-1]
+        direction = mesh.join(du[1], dY[1], t_period)
+        if tangent is None:
+            new = Tangent(direction, 1.0, 1.0)
+        else:
+            before_p[index] -= dl[0, mesh.own]
+            size = np.sqrt((weights * dY[1] ** 2).sum() + weight_T * t_period**2 + (weight * t_parameter) ** 2)
+            new = Tangent(direction / size, t_parameter / size, weight)
+        linearisation = CollocationLinearisation(self, before, before_p, work, sign) if mesh is self.mesh else work
+        if mesh is self.mesh and arc:
+            self._memo["tangent"] = (u, index, new)
+        return Corrected(u, params, new, float(residual), iterations, int(sign), linearisation, True)
+
+    def _not_finite(self, mesh: OrbitMesh, work: Workspace) -> str:
+        bad = np.argwhere(~np.isfinite(work.F))
+        if not len(bad):
+            return "not finite: a derivative or the solution"
+        point, state = bad[0]
+        where = mesh.phase[point] if not mesh.own else mesh.points.ravel()[point]
+        return f"not finite: state {self.system.states[state]} at phase {where:.3g}"
+
+    def linearise(self, u: Array, params: Array) -> CollocationLinearisation:
+        """The linearisation at (u, params)."""
+        mesh, rule = self.mesh, self.mesh.rule
+        u, params = np.array(u, float), np.array(params, float)
+        nodes, stages, rest = mesh.split(u)
+        work = Workspace(mesh, len(params), len(self.kept))
+        work.T[:] = rest if mesh.own else 0.0
+        stage, node = np.empty_like(stages), np.empty_like(nodes)
+        _, sigma = kernels.evaluate(
+            self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.update,
+            self.symmetry, self.winding, self.scales, params, nodes, stages, work.T, work.F, work.J, work.Fp, work.dT,
+            stage, node,
+        )  # fmt: skip
+        sign = 0.0
+        if np.isfinite(work.J).all():
+            empty = np.empty((mesh.intervals, mesh.degree * mesh.n, 0))
+            sign = kernels.condense(
+                rule.inverse, rule.matrix, rule.row_sums, rule.update, mesh.h, sigma, work.J, self.kept, self.position,
+                empty, work.LU, work.pivots, work.Z, work.M,
+            )  # fmt: skip
+        if sign == 0.0:
+            work.M[:], work.Z[:] = np.nan, np.nan
+        return CollocationLinearisation(self, u, params, work, sign)
+
+    # ------------------------------------------------------------------ starts, meshes, results
+    def start(self, params: Array, guess: Any = None) -> Array:
+        """A converged u from a guess (see `orbit_starts`), or an error that says which guess to give."""
+        return started(self, np.asarray(params, float), guess)
+
+    def seed(self) -> Seed | None:
+        """None: not born at a special point."""
+        return None
+
+    def adapt(
+        self, u: Array, params: Array, tangent: Tangent | None
+    ) -> tuple[Collocation, Array, Tangent | None] | None:
+        """A better mesh or better scales (see `orbit_adaption`), or None."""
+        return adapted(self, u, params, tangent) if self.adaptive else None
+
+    def measures(self, u: Array, params: Array) -> dict[str, float]:
+        """Columns of a branch (see `orbit_measures`)."""
+        return orbit_measures(self, u, params)
+
+    def view(self, u: Array, params: Array) -> PeriodicOrbit:
+        """The orbit as a user sees it."""
+        return orbit_view(self, u, np.asarray(params, float))
+
+    def doubled(self, u: Array, params: Array, vector: Array) -> tuple[Collocation, Array, Array]:
+        """The problem of twice the period, the orbit run through twice, and the direction (v(s), -v(s))."""
+        return doubled_problem(self, u, params, vector)
+
+    def discretise(self, times: Array, states: Array, period: float) -> Array:
+        """u of a periodic function from equispaced samples states (n, K)."""
+        return discretised(self, times, states, period)
+
+    # ------------------------------------------------------------------ spectrum and error
+    def refined(self, u: Array, params: Array) -> tuple[Array, Array, Workspace] | None:
+        """(change of u's nodes, corrected u at degree m + 1, its arrays) of one Newton step; None if it failed."""
+        known = self._memo.get("refined")
+        if known is not None and np.array_equal(known[0], u) and np.array_equal(known[1], params):
+            return known[2]  # type: ignore[no-any-return]
+        mesh = self.mesh
+        nodes, stages, rest = mesh.split(u)
+        higher = mesh.raised[0]
+        start = higher.join(nodes, mesh.raise_degree(nodes, stages), rest)
+        index, tangent = 0, None
+        at = self._memo.get("tangent")
+        if at is not None and np.array_equal(at[0], u):
+            index, t = at[1], at[2]
+            t_nodes, t_stages, t_rest = mesh.split(t.u)
+            tangent = Tangent(higher.join(t_nodes, mesh.raise_degree(t_nodes, t_stages), t_rest), t.parameter, t.weight)
+        found = self._newton(higher, start, params, index, tangent, 0.0, np.inf, 1)
+        result = None
+        if found.converged:
+            change = higher.split(found.u)[0] - nodes
+            result = (change, found.u, found.linearisation)
+        self._memo["refined"] = (np.array(u), np.array(params), result)
+        return result
+
+    def error(self, u: Array, params: Array) -> float:
+        """Largest error of the nodes over the scales of the states (and of the period), by degree m + 1; inf: unknown."""
+        refined = self.refined(u, params)
+        if refined is None:
+            return np.inf
+        worst = float(np.abs(refined[0] / self.scales).max())
+        if self.mesh.own:
+            worst = max(worst, abs(float(refined[1][-1] - u[-1])) / float(u[-1]))
+        return worst
+
+    def spectrum(self, linearisation: CollocationLinearisation) -> Spectrum:
+        """Multipliers, their error (by degree m + 1, and the trivial multiplier's distance from 1), counts, verdict."""
+        M, error = linearisation.spectral, 0.0
+        if not np.isfinite(M).all():
+            return orbit_spectrum(np.full(self.mesh.n - self.mesh.own, np.nan, complex), np.inf)
+        if self.mesh.own:
+            direction = self._direction_of_flow(linearisation)
+            M, error = deflated(M, direction)
+        values = eigenvalues(M)
+        refined = self.refined(linearisation.u, linearisation.params)
+        if refined is None:
+            return orbit_spectrum(values, np.inf)
+        other = self._spectral_of(refined[2].M)
+        if self.mesh.own:
+            other = deflated(other, direction)[0]
+        error += spectrum_distance(values, eigenvalues(other)) + 1e-15 * float(np.abs(M).max()) * len(M)
+        return orbit_spectrum(values, error)
+
+    def _spectral_of(self, factors: Array) -> Array:
+        from ..kernels.condensation_reduced import monodromy_product
+
+        product = monodromy_product(factors)
+        return np.asarray(np.linalg.solve(self.symmetry, product) * self.scales / self.scales[:, None])
+
+    def _direction_of_flow(self, linearisation: CollocationLinearisation) -> Array:
+        """f at phase zero over the scales: the direction of the trivial multiplier."""
+        start = self.mesh.split(linearisation.u)[0][:1]
+        value = self.evaluations.F(None, np.ascontiguousarray(start), linearisation.params)[0]
+        return np.asarray(value / self.scales)

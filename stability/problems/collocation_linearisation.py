@@ -1,0 +1,295 @@
+r"""The linearisation of a collocation problem: condensed solves, monodromy, core, and exact gradients of both.
+
+With the fundamental matrix Phi of the span (product of the condensed M_j), the boundary condition x(1) = S x(0) + w
+and scales D = diag(scales of the states), spectral matrix and core are (y = D^-1 x(0), tau = dT / T)
+
+    M = D^-1 S^-1 Phi D,      core = M - I   (forced),      core = [[M - I, D^-1 S^-1 dx(1)/dtau], [phase row]].
+
+Gradients of g = w^T M v and w^T [core, s_free] v follow from one forward sweep (the variation V, tau, lambda that starts
+at v) and one backward sweep (omega, from w): the stage residual is R = W (Y - u) - h sigma f, so with z = (x, p)
+
+    dg = sum h omega^T d( sigma f_z (V, lambda) + (span tau + sigma_lambda lambda) f ),
+
+which needs second directional derivatives f_zz[(V, lambda), e_k] only, all k in one batched call.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..kernels.condensation import solve_stages
+from ..kernels.condensation_reduced import monodromy_product, reduce_and_solve
+from ..kernels.condensation_sweeps import adjoint_sweep, forward_sweep
+from .orbit_mesh import OrbitMesh
+
+if TYPE_CHECKING:
+    from .collocation import Collocation
+
+__all__ = ["CollocationLinearisation", "Workspace"]
+
+Array = np.ndarray
+
+
+class Workspace:
+    """The arrays a kernel fills at one linearisation: field and derivatives at the stages, factors, node relations."""
+
+    __slots__ = ("LU", "F", "Fp", "J", "M", "T", "Z", "dT", "pivots")
+
+    def __init__(self, mesh: OrbitMesh, m: int, kept: int) -> None:
+        count, N, n = mesh.intervals * mesh.degree, mesh.intervals, mesh.n
+        size = mesh.degree * kept
+        self.F, self.J, self.Fp = np.empty((count, n)), np.empty((count, n, n)), np.empty((count, n, m))
+        self.T, self.dT = np.zeros(1), np.zeros(m)
+        self.LU, self.pivots = np.empty((N, size, size)), np.empty((N, size), np.int64)
+        self.Z, self.M = np.empty((N, mesh.degree * n, n)), np.empty((N, n, n))
+
+
+@dataclass(frozen=True, eq=False)
+class CollocationLinearisation:
+    """F, F_u and spectral data at (u, p); see `protocols.Linearisation`. `sign` = 0: a singular interval."""
+
+    problem: Collocation
+    u: Array
+    params: Array
+    work: Workspace
+    sign: float
+    _memo: dict[str, Any] = field(default_factory=dict)
+
+    # ------------------------------------------------------------------ shorthands
+    @property
+    def mesh(self) -> OrbitMesh:
+        """The discretisation."""
+        return self.problem.mesh
+
+    @cached_property
+    def sigma(self) -> float:
+        """dt/ds."""
+        return float(self.mesh.span * self.work.T[0])
+
+    @property
+    def period(self) -> float:
+        """Forcing period, or the orbit's own."""
+        return float(self.work.T[0])
+
+    @cached_property
+    def phase_row(self) -> Array:
+        """(N, mn) of the phase condition (autonomous): weights . x' with u as its own reference, normalised."""
+        mesh, weights = self.mesh, self.problem.quadrature
+        nodes, stages, _ = mesh.split(self.u)
+        inner = stages.reshape(mesh.intervals, mesh.degree, mesh.n) - nodes[:-1, None, :]
+        slope = np.einsum("ik,jkn->jin", mesh.rule.inverse, inner).reshape(stages.shape) / mesh.h[:, None]
+        length = float(np.sqrt((weights * slope**2).sum()))
+        return np.asarray(weights * slope / (length if length > 0 else 1.0))
+
+    # ------------------------------------------------------------------ residual and columns
+    @cached_property
+    def residual(self) -> Array:
+        """F(u, p): node equations, boundary condition, stage equations, phase (0: u is its own reference)."""
+        mesh, rule = self.mesh, self.mesh.rule
+        nodes, stages, _ = mesh.split(self.u)
+        inner = stages.reshape(mesh.intervals, mesh.degree, mesh.n)
+        W, d = rule.inverse, rule.update
+        field_part = (mesh.h * self.sigma)[:, None, None] * self.work.F.reshape(inner.shape)
+        stage = np.einsum("ik,jkn->jin", W, inner - nodes[:-1, None, :]) - field_part
+        node = np.empty_like(nodes)
+        node[:-1] = nodes[1:] - (1 - d.sum()) * nodes[:-1] - np.einsum("i,jin->jn", d, inner)
+        node[-1] = nodes[-1] - self.problem.symmetry @ nodes[0] - self.problem.winding
+        return mesh.join(node, stage, 0.0)
+
+    def _stage_column(self, free: int) -> Array:
+        """(N, mn): derivative of the stage equations by parameter `free`, -1: by the period."""
+        mesh, work = self.mesh, self.work
+        if free < 0:
+            values = mesh.span * work.F
+        else:
+            values = self.sigma * work.Fp[:, :, free] + mesh.span * work.dT[free] * work.F
+        return np.asarray(-mesh.h[:, None] * values.reshape(mesh.intervals, -1))
+
+    def column(self, name: str) -> Array:
+        """dF/dp_name, (N,)."""
+        out = np.zeros(self.mesh.size)
+        self.mesh.split(out)[1][:] = self._stage_column(self.problem.index(name))
+        return out
+
+    # ------------------------------------------------------------------ solving
+    def _factors(self) -> tuple[Any, ...]:
+        mesh, work, problem = self.mesh, self.work, self.problem
+        return mesh.rule.matrix, mesh.h, self.sigma, work.J, problem.kept, problem.position, work.LU, work.pivots
+
+    def solve(self, rows: Array, columns: Array, corner: Array, right_sides: Array) -> Array:
+        """Solve [[F_u, columns], [rows, corner]] x = right_sides; singular: non-finite numbers."""
+        mesh, problem = self.mesh, self.problem
+        N, n, own = mesh.intervals, mesh.n, mesh.own
+        q, sides = columns.shape[1], right_sides.shape[1]
+        body = np.concatenate([columns, right_sides[: mesh.size]], axis=1)
+        extra = own + q + sides
+        X, nodes = np.empty((N, mesh.degree * n, extra)), np.zeros((N + 1, n, extra))
+        all_rows, node_rows = np.zeros((own + q, N, mesh.degree * n)), np.zeros((own + q, N + 1, n))
+        corners = np.zeros((own + q, extra))
+        if own:
+            X[:, :, 0] = self._stage_column(-1)
+            all_rows[0] = self.phase_row
+        for k in range(q + sides):
+            nodes[:, :, own + k], X[:, :, own + k], rest = mesh.split(np.ascontiguousarray(body[:, k]))
+            corners[:own, own + k] = rest
+        for r in range(q):
+            node_rows[own + r], all_rows[own + r], rest = mesh.split(np.ascontiguousarray(rows[r], dtype=float))
+            corners[own + r, :own] = rest
+        corners[own:, own : own + q] = corner
+        corners[own:, own + q :] = right_sides[mesh.size :]
+        out = np.full((mesh.size + q, sides), np.nan)
+        if self.sign == 0.0 or not np.isfinite(body).all():
+            return out
+        solve_stages(*self._factors(), X)
+        du, dY, dl, sign = reduce_and_solve(
+            mesh.rule.update, self.work.Z, self.work.M, X, nodes, all_rows, node_rows, corners, problem.symmetry, 0
+        )
+        if sign != 0.0:
+            for k in range(sides):
+                out[: mesh.size, k] = mesh.join(du[k], dY[k], dl[k, :own])
+                out[mesh.size :, k] = dl[k, own:]
+        return out
+
+    # ------------------------------------------------------------------ spectral matrix and core
+    @cached_property
+    def fundamental(self) -> Array:
+        """Phi (n, n) of the span, in the states' own units."""
+        return np.asarray(monodromy_product(self.work.M))
+
+    @cached_property
+    def spectral(self) -> Array:
+        """M = D^-1 S^-1 Phi D."""
+        D = self.problem.scales
+        return np.asarray(np.linalg.solve(self.problem.symmetry, self.fundamental) * D / D[:, None])
+
+    def _variation(self, start: Array, tau: float, free: int, amount: float) -> tuple[Array, Array]:
+        """Nodes (N + 1, n), stages (N, mn) of the variation with dx(0) = start, dT = tau, dp_free = amount."""
+        mesh = self.mesh
+        X = np.zeros((mesh.intervals, mesh.degree * mesh.n, 1))
+        if tau != 0.0:
+            X[:, :, 0] -= tau * self._stage_column(-1)
+        if amount != 0.0:
+            X[:, :, 0] -= amount * self._stage_column(free)
+        if tau != 0.0 or amount != 0.0:
+            solve_stages(*self._factors(), X)
+        none = np.zeros((mesh.intervals, mesh.n, 1))
+        du, dY = forward_sweep(mesh.rule.update, self.work.Z, X, none, np.ascontiguousarray(start[:, None], float))
+        return du[0], dY[0]
+
+    def _end(self, nodes: Array, stages: Array) -> Array:
+        """The core equations of a variation that satisfies the inner ones: (k,)."""
+        problem, D = self.problem, self.problem.scales
+        gap = np.linalg.solve(problem.symmetry, nodes[-1]) - nodes[0]
+        if not self.mesh.own:
+            return np.asarray(gap / D)
+        return np.append(gap / D, (self.phase_row * stages).sum())
+
+    @cached_property
+    def core(self) -> Array:
+        """(k, k); see the head of this file."""
+        n, own = self.mesh.n, self.mesh.own
+        core = np.empty((n + own, n + own))
+        core[:n, :n] = self.spectral - np.eye(n)
+        if own:
+            D = self.problem.scales
+            for k in range(n):
+                unit = np.zeros(n)
+                unit[k] = D[k]
+                core[n, k] = (self.phase_row * self._variation(unit, 0.0, 0, 0.0)[1]).sum()
+            core[:, n] = self._end(*self._variation(np.zeros(n), self.period, 0, 0.0))
+        return core
+
+    def core_column(self, name: str) -> Array:
+        """s_name, (k,)."""
+        return self._end(*self._variation(np.zeros(self.mesh.n), 0.0, self.problem.index(name), 1.0))
+
+    def embed(self, w: Array) -> Array:
+        """(N,): S D w in the boundary condition, the last entry in the phase condition."""
+        n = self.mesh.n
+        out = np.zeros(self.mesh.size, dtype=np.result_type(w, float))
+        nodes, _, rest = self.mesh.split(out)
+        nodes[-1] = self.problem.symmetry @ (self.problem.scales * w[:n])
+        rest[:] = w[n:]
+        return out
+
+    def lift(self, v: Array, free: str | None = None) -> Array:
+        """(N,) the unknowns that belong to core unknowns v when all inner equations hold."""
+        if np.iscomplexobj(v):
+            return self.lift(v.real, free) + 1j * self.lift(v.imag, free)
+        n, own = self.mesh.n, self.mesh.own
+        index = 0 if free is None else self.problem.index(free)
+        tau = float(v[n]) * self.period if own else 0.0
+        nodes, stages = self._variation(self.problem.scales * v[:n], tau, index, 0.0 if free is None else float(v[-1]))
+        return self.mesh.join(nodes, stages, tau)
+
+    # ------------------------------------------------------------------ gradients
+    def spectral_gradient(self, w: Array, v: Array) -> tuple[Array, Array]:
+        """Gradient of w^T M v by u and by p."""
+        extended = np.concatenate([v, np.zeros(self.mesh.own + 1)])
+        return self._bilinear(np.concatenate([w, np.zeros(self.mesh.own)]), extended, 0)
+
+    def core_gradient(self, w: Array, v: Array, free: str) -> tuple[Array, Array]:
+        """Gradient of w^T [core, s_free] v by u and by p."""
+        return self._bilinear(w, v, self.problem.index(free))
+
+    def _bilinear(self, w: Array, v: Array, free: int) -> tuple[Array, Array]:
+        """Complex w and v by the real ones."""
+        kind = np.result_type(w, v, float)
+        total = np.zeros(self.mesh.size, kind), np.zeros(len(self.params), kind)
+        for a, real_w in ((1.0, np.real(w)), (1j, np.imag(w))):
+            for b, real_v in ((1.0, np.real(v)), (1j, np.imag(v))):
+                if np.any(real_w) and np.any(real_v):
+                    factor = a * b if np.iscomplexobj(total[0]) else 1.0
+                    for whole, part in zip(total, self._gradient(real_w, real_v, free)):
+                        whole += factor * part
+        return total
+
+    def _gradient(self, w: Array, v: Array, free: int) -> tuple[Array, Array]:
+        problem, mesh, work = self.problem, self.mesh, self.work
+        n, m, own = mesh.n, len(self.params), mesh.own
+        N, count, D = mesh.intervals, mesh.intervals * mesh.degree, problem.scales
+        tau, amount = (float(v[n]) * self.period if own else 0.0), float(v[-1])
+        _, V = self._variation(D * v[:n], tau, free, amount)
+        eta = np.linalg.solve(problem.symmetry.T, w[:n] / D)
+        rho = self.phase_row * float(w[n]) if own else np.zeros((N, mesh.degree * n))
+        A, h, sigma, J, kept, position, LU, pivots = self._factors()
+        omega = adjoint_sweep(
+            A, mesh.rule.row_sums, mesh.rule.update, h, sigma, J, kept, position, LU, pivots, rho, eta
+        )
+        weighted = (omega * mesh.h[:, None]).reshape(count, n)
+        V = V.reshape(count, n)
+        direction = np.zeros((count, n + m))
+        direction[:, :n], direction[:, n + free] = V, amount
+        second = np.einsum("kcn,cn->ck", self._second(direction), weighted)  # (count, n + m)
+        along = np.einsum("cij,cj->ci", J, V) + amount * work.Fp[:, :, free]
+        stretch = mesh.span * (tau + work.dT[free] * amount)
+        g_state = sigma * second[:, :n] + stretch * np.einsum("cij,ci->cj", J, weighted)
+        g_params = sigma * second[:, n:].sum(axis=0) + stretch * np.einsum("cim,ci->m", work.Fp, weighted)
+        change = (along * weighted).sum()
+        g_params += mesh.span * work.dT * change
+        if not own and amount != 0.0:
+            g_params += mesh.span * amount * problem.flow.period_second(self.params, free) * (work.F * weighted).sum()
+        rest = mesh.span * change if own else 0.0
+        if own:
+            # tau = T v_n: the core unknown is relative, so that T itself appears once more
+            rest += float(v[n]) * mesh.span * (work.F * weighted).sum()
+        return mesh.join(np.zeros((N + 1, n)), g_state, rest), g_params
+
+    def _second(self, direction: Array) -> Array:
+        """f_zz[direction, e_k] for all k: (n + m, count, n), one batched call; unit directions of the variables' size."""
+        mesh, problem = self.mesh, self.problem
+        count, width = direction.shape
+        states = np.ascontiguousarray(mesh.split(self.u)[1].reshape(count, mesh.n))
+        sizes = np.concatenate([problem.scales, np.maximum(np.abs(self.params), 1e-3)])
+        length = np.abs(direction / sizes).max()
+        if length == 0:
+            return np.zeros((width, count, mesh.n))
+        units = np.repeat(np.diag(sizes), count, axis=0)
+        values = problem.evaluations.second(
+            np.tile(mesh.phase, width), np.tile(states, (width, 1)), self.params, np.tile(direction / length, (width, 1)), units
+        )
+        return np.asarray(values.reshape(width, count, mesh.n) * (length / sizes)[:, None, None])

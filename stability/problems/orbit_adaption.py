@@ -1,0 +1,78 @@
+"""When and how the mesh and the scales of a collocation problem follow the solution.
+
+The error of the nodes goes like N^(-2m); the wanted `accuracy` gives the number of intervals,
+
+    N_new = N (safety . error / accuracy)^(1 / 2m),
+
+limited to a factor between 2/3 and 2, with a dead band so that the mesh rests while the error is between 1e-5 and 1
+times the accuracy. The intervals are placed by equidistribution (kernels/meshes.py) when the error per interval is uneven.
+Scales are the largest moduli of the states on the orbit, kept within a factor of 2 of them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.meshes import equidistribute, monitor
+from ..protocols import Tangent
+
+if TYPE_CHECKING:
+    from .collocation import Collocation
+
+__all__ = ["adapted", "state_scales"]
+
+Array = np.ndarray
+_UNEVEN = 1.5  # largest share of the monitor over the mean share that is left alone
+_TINY = 1e-6
+
+
+def state_scales(values: Array) -> Array:
+    """(n,) largest moduli of values (K, n); a state that is (nearly) zero takes the largest scale of all, at most 1."""
+    size = np.abs(values).max(axis=0)
+    largest = float(size.max())
+    if not np.isfinite(largest) or largest == 0.0:
+        return np.ones(len(size))
+    return np.where(size > _TINY * largest, size, min(largest, 1.0))
+
+
+def adapted(
+    problem: Collocation, u: Array, params: Array, tangent: Tangent | None
+) -> tuple[Collocation, Array, Tangent | None] | None:
+    """(problem, u, tangent) with a better mesh or better scales; None where the present ones are good."""
+    mesh = problem.mesh
+    nodes, stages, rest = mesh.split(u)
+    scales = state_scales(np.concatenate([nodes, stages.reshape(-1, mesh.n)]))
+    period_scale = float(rest[0]) if mesh.own else 1.0
+    ratios = np.append(scales / problem.scales, period_scale / problem.period_scale)
+    rescale = bool((ratios > 2).any() or (ratios < 0.5).any())
+    if not rescale:
+        scales, period_scale = problem.scales, problem.period_scale
+    error = problem.error(u, params)
+    breaks = problem.break_points(params)
+    rho = monitor(mesh.edges, mesh.leading(nodes, stages) / scales, mesh.degree, breaks)
+    share = rho * mesh.h
+    count = _wanted_intervals(problem, error)
+    moved = any(np.abs(mesh.edges - b).min() > 1e-12 for b in breaks)
+    uneven = error > 1e-2 * problem.accuracy and share.max() > _UNEVEN * share.mean()
+    if not (rescale or moved or uneven or count != mesh.intervals):
+        return None
+    edges = mesh.edges
+    if moved or uneven or count != mesh.intervals:
+        edges = equidistribute(mesh.edges, rho, count, breaks)
+    new = dataclasses.replace(problem, edges=edges, scales=scales, period_scale=period_scale, _memo={})
+    if tangent is not None:
+        tangent = Tangent(mesh.transfer(tangent.u, new.mesh), tangent.parameter, tangent.weight)
+    return new, mesh.transfer(u, new.mesh), tangent
+
+
+def _wanted_intervals(problem: Collocation, error: float) -> int:
+    N = problem.mesh.intervals
+    ratio = min(error / problem.accuracy, 1e12) if np.isfinite(error) else 1e3
+    if 1e-5 <= ratio <= 1.0 or (ratio < 1.0 and problem.intervals >= N):
+        return N
+    factor = float((4.0 * ratio) ** (0.5 / problem.mesh.degree)) if ratio > 0 else 0.0
+    wanted = int(np.ceil(N * min(max(factor, 2 / 3), 2.0)))
+    return int(min(max(wanted, problem.intervals), 1000))

@@ -1,0 +1,80 @@
+"""Multipliers of a periodic orbit as integer counts and a verdict.
+
+Stable: all multipliers inside the unit circle, apart from the trivial one of an autonomous orbit. The trivial
+multiplier belongs to the direction f of the flow; it is removed exactly, by the orthogonal change of basis whose first
+vector is f / |f|,
+
+    Q^T M Q = [ 1  * ]
+              [ 0  M_2 ],      multipliers = eigenvalues of M_2,
+
+and |M f - f| / |f| is a measured error. A multiplier closer to the unit circle than the error is not counted as
+outside, and a verdict that depends on it is UNDETERMINED.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..protocols import Spectrum
+from ..words import Verdict
+
+__all__ = ["deflated", "eigenvalues", "orbit_spectrum", "spectrum_distance"]
+
+Array = np.ndarray
+
+
+def eigenvalues(matrix: Array) -> Array:
+    """Complex eigenvalues by descending modulus; 2 x 2 in closed form (without cancellation)."""
+    if matrix.shape == (2, 2):
+        (a, b), (c, d) = matrix.tolist()
+        half, det = (a + d) / 2, a * d - b * c
+        square = ((a - d) / 2) ** 2 + b * c
+        if square >= 0:
+            large = half + math.copysign(math.sqrt(square), half)
+            return np.array([large, det / large if large else 0.0], complex)
+        root = math.sqrt(-square)
+        return np.array([complex(half, root), complex(half, -root)])
+    if not matrix.size:
+        return np.zeros(0, complex)
+    values = np.linalg.eigvals(matrix).astype(complex)
+    return np.asarray(values[np.lexsort((-values.imag, -np.abs(values).round(14)))])
+
+
+def deflated(matrix: Array, direction: Array) -> tuple[Array, float]:
+    """(M_2, |M f - f| / |f|); see the head of this file."""
+    f = direction / np.linalg.norm(direction)
+    reflector = f.copy()
+    reflector[0] += math.copysign(1.0, f[0])
+    H = np.eye(len(f)) - 2 * np.outer(reflector, reflector) / (reflector @ reflector)
+    return (H @ matrix @ H)[1:, 1:], float(np.linalg.norm(matrix @ f - f))
+
+
+def spectrum_distance(values: Array, others: Array) -> float:
+    """Largest distance of the values near or outside the unit circle to their partners, relative to max(1, |mu|)."""
+    worst = 0.0
+    for value in values.tolist():
+        if abs(value) > 0.3:
+            worst = max(worst, min(abs(value - other) for other in others.tolist()) / max(1.0, abs(value)))
+    return worst
+
+
+def orbit_spectrum(values: Array, error: float) -> Spectrum:
+    """Counts and verdict of the non-trivial multipliers `values`, whose error near the unit circle is `error`."""
+    plus = minus = pairs = 0
+    radius = 0.0
+    for value in values.tolist():
+        radius = max(radius, abs(value))
+        if abs(value) > 1.0:
+            if value.imag == 0.0:
+                plus, minus = plus + (value.real > 0), minus + (value.real < 0)
+            elif value.imag > 0.0:
+                pairs += 1
+    if not math.isfinite(radius):
+        verdict = Verdict.UNDETERMINED
+    elif radius > 1.0 + error:
+        verdict = Verdict.UNSTABLE
+    else:
+        verdict = Verdict.STABLE if radius < 1.0 - error else Verdict.UNDETERMINED
+    return Spectrum(values, error, plus + minus + 2 * pairs, plus, minus, pairs, verdict)

@@ -1,0 +1,167 @@
+"""First points of periodic-orbit problems: from nothing, a state, an orbit, samples, a doubled orbit.
+
+Forced systems: Newton's first step from x = 0 is the linear response; where Newton fails, transients are integrated
+and Newton starts from the last period. Autonomous systems need something to start from: a state (its transients are
+integrated until they close up), an orbit, or a Hopf point (`switch`). Samples of a periodic function are interpolated
+trigonometrically, so that switching can add a direction to an orbit in any layout.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ConvergenceError, InputError
+from ..protocols import Corrected
+
+if TYPE_CHECKING:
+    from .collocation import Collocation
+
+__all__ = ["discretised", "doubled_problem", "from_function", "started"]
+
+Array = np.ndarray
+_TOLERANCE = 1e-10
+_TRANSIENTS = 400  # periods of a forced system
+
+
+def from_function(problem: Collocation, function: Callable[[Array], Array], period: float) -> Array:
+    """u of x = function(t) -> (n, K) with the given orbit period."""
+    mesh = problem.mesh
+    length = period * (0.5 if problem.halved else 1.0)
+    s = np.concatenate([mesh.edges, mesh.points.ravel()])
+    values = np.asarray(function(s * length), float).T
+    return mesh.join(values[: mesh.intervals + 1], values[mesh.intervals + 1 :], period)
+
+
+def discretised(problem: Collocation, times: Array, states: Array, period: float) -> Array:
+    """u of the trigonometric interpolant of equispaced samples states (n, K)."""
+    states = np.asarray(states, float)
+    count = states.shape[1]
+    phase = (times - times[0]) / period
+    coefficients = np.fft.rfft(states - phase * problem.winding[:, None], axis=1) / count
+    if count % 2 == 0:
+        coefficients[:, -1] *= 0.5
+    k = np.arange(coefficients.shape[1])
+    factor = np.where(k == 0, 1.0, 2.0)
+
+    def function(t: Array) -> Array:
+        s = (t - times[0]) / period
+        waves = (factor * coefficients) @ np.exp(2j * np.pi * np.outer(k, s))
+        return np.asarray(waves.real + s * problem.winding[:, None])
+
+    return from_function(problem, function, period)
+
+
+def doubled_problem(
+    problem: Collocation, u: Array, params: Array, vector: Array
+) -> tuple[Collocation, Array, Array]:
+    """Twice the period: the mesh twice, the orbit twice, and the variation (v(s), -v(s)) of M v = -v."""
+    mesh = problem.mesh
+    edges = np.concatenate([mesh.edges / 2, 0.5 + mesh.edges[1:] / 2])
+    if problem.halved:  # the whole orbit is an orbit of one period without the symmetry's help
+        raise InputError("a doubled orbit starts from the orbit on its whole period: build the problem without symmetry")
+    multiple = problem.multiple if mesh.own else 2 * problem.multiple
+    new = dataclasses.replace(
+        problem, multiple=multiple, intervals=2 * problem.intervals, edges=edges, winding=2 * problem.winding,
+        symmetry=None, period_scale=2 * problem.period_scale if mesh.own else 1.0, _memo={},
+    )  # fmt: skip
+    nodes, stages, rest = mesh.split(u)
+    shifted = np.tile(problem.winding, mesh.degree)
+    twice = new.mesh.join(
+        np.concatenate([nodes, nodes[1:] + problem.winding]), np.concatenate([stages, stages + shifted]), 2 * rest
+    )
+    linearisation = problem.linearise(u, params)
+    lifted = linearisation.lift(np.concatenate([vector, np.zeros(mesh.own)]))
+    dn, ds, _ = mesh.split(lifted)
+    direction = new.mesh.join(np.concatenate([dn, -dn[1:]]), np.concatenate([ds, -ds]), 0.0)
+    return new, twice, direction
+
+
+# ---------------------------------------------------------------------- start
+def started(problem: Collocation, params: Array, guess: Any) -> Array:
+    """A converged u; see the head of this file.
+
+    guess: None, a state (mapping of names or array (n,)), an array u, an orbit (callable with `period`), a fixed point
+    (with `x`), or a function t -> (n, K) together with its period as the tuple (function, period).
+    """
+    mesh = problem.mesh
+    if isinstance(guess, np.ndarray) and guess.shape == (mesh.size,):
+        return _settled(problem, np.array(guess, float), params, "the given solution")
+    if isinstance(guess, tuple) and len(guess) == 2 and callable(guess[0]):
+        return _settled(problem, from_function(problem, guess[0], float(guess[1])), params, "the given function")
+    if callable(guess) and hasattr(guess, "period"):
+        return _from_orbit(problem, params, guess)
+    if guess is None and not mesh.own:
+        return _from_rest(problem, params)
+    if guess is None:
+        raise InputError(
+            f"'{problem.system.name}' is autonomous: give a state near the orbit (start=dict(...)), an orbit, or start "
+            "from a Hopf point by switch(...)"
+        )
+    state = guess.x if hasattr(guess, "x") and np.ndim(guess.x) == 1 else guess
+    return _from_transients(problem, params, problem.system.state_vector(state))
+
+
+def _newton(problem: Collocation, u: Array, params: Array) -> Corrected:
+    name = next(iter(problem.parameters), "")
+    return problem.correct(u, params, name, None, 0.0, _TOLERANCE)
+
+
+def _settled(problem: Collocation, u: Array, params: Array, what: str) -> Array:
+    found = _newton(problem, u, params)
+    if not found.converged:
+        raise _failed(problem, params, found, what)
+    return found.u
+
+
+def _failed(problem: Collocation, params: Array, found: Corrected, what: str) -> ConvergenceError:
+    where = ", ".join(f"{k} = {v:g}" for k, v in zip(problem.parameters, params))
+    return ConvergenceError(
+        f"Newton's method did not reach a periodic orbit of '{problem.system.name}' from {what} ({found.note}; residual "
+        f"{found.residual:.1e}) at {where}; give a state on or near the orbit, an orbit of another method, or start at "
+        "another parameter value",
+        residual=found.residual, iterations=found.iterations, u=found.u, params=params,
+    )  # fmt: skip
+
+
+def _from_orbit(problem: Collocation, params: Array, orbit: Any) -> Array:
+    states = getattr(orbit, "states", problem.system.states)
+    if tuple(states) != tuple(problem.system.states):
+        raise InputError(f"the orbit has the states {tuple(states)}, the system {tuple(problem.system.states)}")
+    period = float(orbit.period)
+    if not problem.mesh.own:
+        wanted = problem.multiple * problem.evaluations.period(params)
+        turns = wanted / (period * round(max(1.0, wanted / period)))
+        if not 0.5 < turns < 2:
+            raise InputError(f"the orbit's period {period:g} does not fit {problem.multiple} forcing periods, {wanted:g}")
+        ratio = period / wanted * max(1, round(wanted / period))
+        return _settled(problem, from_function(problem, lambda t: orbit(t * ratio), wanted), params, "the given orbit")
+    return _settled(problem, from_function(problem, orbit, period), params, "the given orbit")
+
+
+def _from_rest(problem: Collocation, params: Array) -> Array:
+    mesh = problem.mesh
+    wind = np.concatenate([mesh.edges, mesh.points.ravel()])[:, None] * problem.winding
+    u = mesh.join(wind[: mesh.intervals + 1], wind[mesh.intervals + 1 :], 0.0)
+    found = _newton(problem, u, params)
+    if found.converged:
+        return found.u
+    return _from_transients(problem, params, np.zeros(mesh.n))
+
+
+def _from_transients(problem: Collocation, params: Array, state: Array) -> Array:
+    from ..integration.transients import settled_orbit
+
+    times, states, period = settled_orbit(problem.system, params, state, problem.multiple, problem.winding, _TRANSIENTS)
+    interpolant = _periodic_cubic(times, states)
+    return _settled(problem, from_function(problem, interpolant, period), params, f"transients from {state.tolist()}")
+
+
+def _periodic_cubic(times: Array, states: Array) -> Callable[[Array], Array]:
+    from scipy.interpolate import CubicSpline
+
+    spline = CubicSpline(times, states, axis=1)
+    return lambda t: np.asarray(spline(np.clip(t, times[0], times[-1])))
