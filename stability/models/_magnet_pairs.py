@@ -55,8 +55,9 @@ class MagnetPair:
 
     Notes
     -----
-    Accuracy: charge model and closed form agree to 1e-12 for gaps from 1e-4 to 10 radii (beyond, the closed form loses
-    digits, the charge model does not); blocks lose (gap/edge)^6 in units of 1e-16.
+    Accuracy: charge model and closed form agree to 1e-13 for gaps up to two radii and to 1e-12 up to three; further
+    out the closed form loses digits (4e-9 at 16 radii), the charge model does not. Blocks lose (gap/edge)^6 in units of
+    1e-16.
 
     Examples
     --------

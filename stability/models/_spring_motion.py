@@ -57,13 +57,24 @@ def refine(function: Callable[[float], float], low: float, high: float) -> float
     return float(brentq(function, low, high, xtol=4e-16 * max(abs(low), abs(high)), rtol=4e-15, maxiter=300))
 
 
-def crossings(force: Callable[[np.ndarray], np.ndarray], grid: np.ndarray) -> tuple[float, ...]:
-    """Zeros of the force, seen as sign changes between neighbouring grid points (closer pairs are lost)."""
+def crossings(force: Callable[[np.ndarray], np.ndarray], grid: np.ndarray, noise: float = 0.0) -> tuple[float, ...]:
+    """Zeros of the force seen as sign changes along the ascending grid (pairs that are closer than the grid are lost).
+
+    Neighbouring grid points at which |force| <= noise count as one zero: q = 0 if it is among them, else what lies
+    between their neighbours. A run of such points that reaches the end of the grid is no equilibrium.
+    """
     values = np.asarray(force(grid), dtype=float)
-    zeros = [float(q) for q in grid[values == 0.0]]
-    for i in np.flatnonzero(values[:-1] * values[1:] < 0.0):
-        zeros.append(refine(lambda q: float(force(np.asarray(q))), float(grid[i]), float(grid[i + 1])))
-    return tuple(sorted(zeros))
+    signs = np.where(np.abs(values) <= noise, 0.0, np.sign(values))
+    zeros: list[float] = []
+    nonzero = np.flatnonzero(signs)
+    for i, j in pairwise(nonzero):
+        if j > i + 1 and grid[i] < 0.0 < grid[j] and np.any(grid[i + 1 : j] == 0.0):
+            zeros.append(0.0)
+        elif signs[i] != signs[j]:
+            zeros.append(refine(lambda q: float(force(np.asarray(q))), float(grid[i]), float(grid[j])))
+        elif j > i + 1:
+            zeros.append(float(grid[(i + j) // 2]))
+    return tuple(zeros)
 
 
 def real_roots(coefficients: Any) -> tuple[float, ...]:

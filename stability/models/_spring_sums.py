@@ -104,7 +104,10 @@ class ParallelSprings(Spring):
         grid = np.unique(np.concatenate([-steps, steps, special]))
         if math.isfinite(low) and math.isfinite(high):
             grid = np.unique(np.concatenate([grid, np.linspace(low, high, 801)]))
-        return crossings(self.force, grid[(grid > low) & (grid < high)])
+        grid = grid[(grid > low) & (grid < high)]
+        ordinary = grid[np.abs(grid) <= max(scales)]
+        noise = 1e-14 * max(float(np.max(np.abs(s.force(ordinary)))) for s in self.springs)
+        return crossings(self.force, grid, noise)
 
     def _sum(self, symbol: Any, symbols: Mapping[str, Any] | None, energy: bool) -> sp.Expr:
         import sympy as sp

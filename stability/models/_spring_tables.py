@@ -157,4 +157,4 @@ class TabulatedSpring(OpaqueSpring):
     def equilibria(self) -> tuple[float, ...]:
         q = np.array(self.displacements)
         fine = q[:-1, None] + np.diff(q)[:, None] * np.arange(4) / 4.0  # quintic pieces may turn
-        return crossings(self.force, np.append(fine.ravel(), q[-1]))
+        return crossings(self.force, np.unique(np.append(fine.ravel(), [0.0, q[-1]])))
