@@ -115,8 +115,8 @@ def _document(
 ) -> dict[str, Any]:  # fmt: skip
     import numpy as np
 
-    words, counts = np.unique(computed.verdict, return_counts=True)
-    shares = {str(word): float(count / computed.verdict.size) for word, count in zip(words, counts)}
+    counts = computed.verdict.counts()
+    shares = {str(word): count / computed.verdict.size for word, count in counts.items() if count}
     return {
         "model": model,
         "set": chosen,

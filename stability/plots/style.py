@@ -20,7 +20,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any
 
-from ..words import Kind, Verdict
+from ..words import Crossing, Kind, Verdict
 
 __all__ = [
     "BOUNDARIES",
@@ -98,11 +98,10 @@ _CODIMENSION_ONE = frozenset({
 })  # fmt: skip
 
 # how a multiplier crosses the unit circle on a tongue's boundary
-BOUNDARIES: Mapping[Kind, tuple[str, Any]] = MappingProxyType({
-    Kind.FOLD: (COLOURS["black"], "solid"),
-    Kind.BRANCH_POINT: (COLOURS["black"], "solid"),
-    Kind.PERIOD_DOUBLING: (COLOURS["vermilion"], (0.0, (5.0, 1.5))),
-    Kind.NEIMARK_SACKER: (COLOURS["blue"], (0.0, (1.5, 1.2))),
+BOUNDARIES: Mapping[Crossing, tuple[str, Any]] = MappingProxyType({
+    Crossing.PLUS_ONE: (COLOURS["black"], "solid"),
+    Crossing.MINUS_ONE: (COLOURS["vermilion"], (0.0, (5.0, 1.5))),
+    Crossing.PAIR: (COLOURS["blue"], (0.0, (1.5, 1.2))),
 })  # fmt: skip
 
 _GREEK = frozenset({
@@ -195,15 +194,16 @@ def line(verdict: Verdict) -> dict[str, Any]:
     return {"linestyle": LINES[verdict], "linewidth": 1.8 if verdict is Verdict.STABLE else 1.2}
 
 
-def boundary_line(kind: Kind | None) -> dict[str, Any]:
-    """Keywords of a tongue's boundary curve: by how the multiplier leaves the unit circle.
+def boundary_line(crossing: str) -> dict[str, Any]:
+    """Keywords of a tongue's boundary curve: by how the multiplier leaves the unit circle (grey if unknown).
 
     Examples
     --------
-    >>> boundary_line(Kind.PERIOD_DOUBLING)["color"] == COLOURS["vermilion"]
+    >>> boundary_line("-1")["color"] == COLOURS["vermilion"]
     True
     """
-    colour, style = BOUNDARIES[kind] if kind is not None and kind in BOUNDARIES else (COLOURS["grey"], "solid")
+    known = crossing in tuple(Crossing)
+    colour, style = BOUNDARIES[Crossing(crossing)] if known else (COLOURS["grey"], "solid")
     return {"color": colour, "linestyle": style, "linewidth": 1.3}
 
 
