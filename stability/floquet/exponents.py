@@ -45,7 +45,9 @@ _LOG2 = float(np.log(2.0))
 
 
 def mathieu_exponent(a: ArrayLike, q: ArrayLike) -> Any:
-    r"""Characteristic exponent ``nu`` of ``x'' + (a - 2 q cos 2z) x = 0``: solutions ``exp(+-i nu z)`` times a pi-periodic function.
+    r"""Characteristic exponent of Mathieu's equation, unfolded.
+
+    ``x'' + (a - 2 q cos 2z) x = 0`` has the solutions ``exp(+-i nu z)`` times a pi-periodic function.
 
     Parameters
     ----------
@@ -174,8 +176,9 @@ def _principal(a: NDArray[np.complex128], q: NDArray[np.complex128], rows: int) 
 
 
 def mathieu_a_of_exponent(nu: ArrayLike, q: ArrayLike) -> Any:
-    r"""The ``a`` for which ``x'' + (a - 2 q cos 2z) x = 0`` has the characteristic exponent ``nu``: inverse of `mathieu_exponent`.
+    r"""The ``a`` of a given characteristic exponent: the inverse of `mathieu_exponent`.
 
+    ``x'' + (a - 2 q cos 2z) x = 0`` with the solutions ``exp(+-i nu z)`` times a pi-periodic function.
     For real ``nu`` in ``[m, m + 1)`` this is eigenvalue number m of the two-sided tridiagonal matrix with diagonal
     ``(nu + 2k)^2`` and off-diagonal ``q`` (DLMF 28.12(i)), symmetric, counted from below.
 
@@ -216,7 +219,8 @@ def mathieu_a_of_exponent(nu: ArrayLike, q: ArrayLike) -> Any:
     if np.any((imaginary > 0) & (real > 0)):
         bad = exponent.ravel()[np.argmax((imaginary > 0) & (real > 0))]
         raise InputError(
-            f"nu = {bad} lies inside a tongue (two values of a, or none) or off the real spectrum; give a real nu or i*y"
+            f"nu = {bad} lies inside a tongue (two values of a, or none) or off the real spectrum; "
+            "give a real nu, or i*y with y >= 0"
         )
     flat, result = np.abs(strength).ravel(), np.empty(real.size)
     growing = imaginary > 0

@@ -42,7 +42,7 @@ _RESCALE = 8
 
 @dataclass(frozen=True)
 class Factors:
-    """``value = mantissa * 2**exponent`` of P_ae, P_be, P_ao, P_bo; all arrays (4, P).
+    """P_ae, P_be, P_ao, P_bo as ``mantissa * 2**exponent``; all arrays (4, P).
 
     `slope` is ``d log P / d a`` of the finite product (its tail is small and smooth), `below` the number of zeros
     below ``a`` (for real arguments).
@@ -55,7 +55,7 @@ class Factors:
 
 
 def rows_for(a: NDArray[Any], q: NDArray[Any]) -> NDArray[np.int64]:
-    """Rows before the tail: four times the turning point of ``a``, and four times that of ``q``; in steps of a quarter."""
+    """Rows before the tail: four times the turning points of ``a`` and of ``q``, in steps of a quarter."""
     rows = np.maximum(24.0, 2.1 * np.sqrt(np.maximum(np.abs(a), np.abs(q))))
     return np.asarray(np.ceil(24.0 * 1.25 ** np.ceil(np.log(rows / 24.0) / np.log(1.25) - 1e-9)), dtype=np.int64)
 
