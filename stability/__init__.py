@@ -28,6 +28,10 @@ _EXPORTS: dict[str, str] = {
     "Status": "words",
     "System": "systems.system",
     "Verdict": "words",
+    "dimensionless": "systems.scaling",
+    "linearised": "systems.linearising",
+    "equations_of_motion": "systems.lagrangian",
+    "mass_matrix": "systems.lagrangian",
     "linear_response": "charting.transfer",
     "LinearResponse": "charting.transfer",
 }

@@ -173,7 +173,7 @@ class LinearResponse:
         own = {symbol(k): v for k, v in self.system.parameters.items() if k != name}
         numerator, denominator = sp.fraction(sp.together(self.transfer(output).subs(own)))
         top, bottom = (_modulus_squared(sp.Poly(p, LAPLACE)) for p in (numerator, denominator))
-        slope = np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom)))
+        slope: Array = np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom)))
         roots = np.roots(np.trim_zeros(np.where(np.abs(slope) < 1e-14 * np.abs(slope).max(), 0.0, slope), "f"))
         squares = np.sort(roots[(np.abs(roots.imag) < 1e-7 * np.abs(roots)) & (roots.real > 0)].real)
         ends = [0.0, 1e8 * (1.0 + (squares.max() if squares.size else 1.0))]

@@ -52,6 +52,10 @@ _MODELS: dict[str, str] = {
 _OTHERS: dict[str, str] = {
     "BlockMagnet": "_magnets",
     "Coil": "_builder",
+    "TRANSLATION_ROTATION": "_analogies",
+    "analogue": "_analogies",
+    "electrical_to_mechanical": "_analogies",
+    "mechanical_to_electrical": "_analogies",
     "DipoleMagnetSpring": "_magnet_one_sided",
     "DiscMagnet": "_magnets",
     "LevitatedMagnetSpring": "_magnet_springs",

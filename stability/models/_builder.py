@@ -106,7 +106,8 @@ def physical_system(
     from ..systems.lagrangian import equations_of_motion
 
     acting: dict[Any, Any] = dict(forces or {})
-    values, shown, extra = {**base.parameters, **parameters}, dict(outputs or {}), []
+    values, shown = {**base.parameters, **parameters}, dict(outputs or {})
+    extra: list[Any] = []
     all_units = {**base.units, **(units or {})}
     electrical: dict[Any, Any] = {}
     if coil is not None:

@@ -26,7 +26,7 @@ _UNITS = dict(inductance="H", capacitance="F", resistance="ohm", omega="rad/s", 
 
 
 def _checked(**values: float) -> dict[str, float]:
-    positive(**{k: values[k] for k in ("inductance", "capacitance", "omega")})
+    positive(inductance=values["inductance"], capacitance=values["capacitance"], omega=values["omega"])
     positive(zero_allowed=True, resistance=values["resistance"])
     return values
 
