@@ -37,7 +37,7 @@ MAX_BITS = 1024  # of the numerator and of the denominator of an exact number: t
 MAX_EXPONENT = 4096  # of a power after sympy has merged powers of powers
 MAX_ALTERNATIVES = 16  # arguments of one max, min or piecewise
 MAX_CONSTANT = 16  # nodes of a constant that stays exact; a larger one becomes a double
-MAX_POWERS = 20  # powers and quotients inside one another: sympy's questions about signs go through all of them
+MAX_POWERS = 16  # powers and quotients inside one another: sympy's questions about signs go through all of them
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 
@@ -208,6 +208,8 @@ class Builder:
             raise ExpressionError(f"'{name}' takes {arity(kind)}, not {len(args)}")
         self._check_types(kind, args)
         constants = [self.value(arg) for arg in args]
+        if kind.name == "mod" and constants[1] == 0:
+            raise ExpressionError("'mod' divides by zero")
         if None not in constants:
             value = _finite(kind, constants)
             if sum(self.sizes.get(arg, 1) for arg in args) > MAX_CONSTANT and not isinstance(value, bool):
@@ -225,6 +227,8 @@ class Builder:
                 raise ExpressionError("a value of 'piecewise' must be a number, not a condition")
             if not _is_condition(condition):
                 raise ExpressionError("each condition of 'piecewise' must be a comparison, such as x > 0")
+            if condition.has(sp.Piecewise):  # sympy would multiply out every case of every case
+                raise ExpressionError("a condition may not contain 'piecewise' or 'where' itself")
             self.value(value), self.value(condition)
         kept: list[tuple[sp.Basic, sp.Basic]] = []
         for value, condition in pairs:

@@ -44,6 +44,7 @@ _REWRITES: dict[Any, Callable[..., sp.Basic]] = {
     sp.acot: lambda a: sp.atan(1 / a),
     sp.ceiling: lambda a: -sp.floor(-a),
     sp.frac: lambda a: a - sp.floor(a),
+    sp.ITE: lambda c, yes, no: sp.Or(sp.And(c, yes), sp.And(sp.Not(c), no)),
     sp.re: lambda a: a,  # every quantity is real where it is defined
     sp.conjugate: lambda a: a,
 }
