@@ -46,7 +46,10 @@ def _eliminated(
     work = [e.xreplace(positive) for e in expressions]
     equations = [(str(e), e.xreplace(positive), sp.S.One) for e in scales if e != 1]
     equations += [(k, e.xreplace(positive), d) for (k, e), d in zip(groups.items(), names)]
-    for i, (label, definition, value) in enumerate(equations):
+    for i in range(len(equations)):
+        label, definition, value = equations[i]
+        if definition == value:  # a scale that is named twice
+            continue
         for choice in sorted(definition.free_symbols - set(names), key=str, reverse=True):
             solved = sp.solve(sp.Eq(definition, value), choice)
             if len(solved) == 1:
