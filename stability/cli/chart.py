@@ -97,16 +97,15 @@ def _about(text: str | None) -> Any:
 
 
 def _write(computed: StabilityChart, path: Path, kind: str) -> None:
-    if path.suffix == ".npz":
+    ending = path.suffix.lower()
+    if ending == ".npz":
         computed.save(path)
-    elif path.suffix == ".csv":
+    elif ending == ".csv":
         computed.to_csv(path)
     else:
-        from matplotlib.figure import Figure
+        from ._pictures import write_picture
 
-        figure = Figure(figsize=(6.4, 4.6), layout="constrained")
-        computed.plot(kind, ax=figure.add_subplot())
-        figure.savefig(path, dpi=200)
+        write_picture(path, lambda axes: computed.plot(kind, ax=axes))
 
 
 def _document(

@@ -44,8 +44,6 @@ def rows(data: dict[str, Any]) -> list[tuple[str, str]]:
 
 def draw(data: dict[str, Any], path: Path) -> None:
     """Growth rate with the boundary curves over it."""
-    from matplotlib.figure import Figure
+    from .._pictures import write_picture
 
-    figure = Figure(figsize=(6.4, 4.6), layout="constrained")
-    data["chart"].plot(ax=figure.add_subplot())
-    figure.savefig(path, dpi=200)
+    write_picture(path, lambda axes: data["chart"].plot(ax=axes))
