@@ -168,7 +168,7 @@ class FunctionEvaluator(Evaluator):
 
     # ------------------------------------------------------------------ period and breaks
 
-    def _period_values(self, P: Array) -> list[Array]:
+    def _period_values(self, P: Array) -> tuple[Array, Array]:
         h = FIRST * np.maximum(np.abs(P), 1.0)
 
         def slope(j: int) -> Array:
@@ -180,8 +180,10 @@ class FunctionEvaluator(Evaluator):
             )
             return np.asarray((4.0 * fine - coarse) / 3.0)
 
-        values = [np.asarray(self._period_of(P), dtype=float), *(slope(j) for j in range(self.m))]
-        return [np.broadcast_to(v, P.shape[:-1]) for v in values]
+        gradient = np.empty(P.shape)
+        for j in range(self.m):
+            gradient[..., j] = slope(j)
+        return np.broadcast_to(np.asarray(self._period_of(P), dtype=float), P.shape[:-1]), gradient
 
     def _break_values(self, P: Array) -> Array:
         return np.array([_as_function(b, self.parameters)(*P) for b in self._breaks], dtype=float)

@@ -16,6 +16,7 @@ share it.
 from __future__ import annotations
 
 import ctypes
+import math
 import threading
 from collections.abc import Sequence
 from typing import Any
@@ -137,14 +138,17 @@ class Evaluator:
         """T(p): a float for P (m,), an array (N,) for P (N, m)."""
         P = self._checked_parameters(P)
         period = self._period_values(P)[0]
-        if not np.all(np.isfinite(period) & (period > 0)):
-            raise InputError(f"the period must be finite and positive, got {period} at {self._named(P)}")
-        return float(period) if P.ndim == 1 else period
+        if P.ndim == 1:
+            period = float(period)
+            if 0.0 < period < math.inf:
+                return period
+        elif np.all((period > 0.0) & (period < np.inf)):
+            return period
+        raise InputError(f"the period must be finite and positive, got {period} at {self._named(P)}")
 
     def period_gradient(self, P: Any) -> Array:
         """dT/dp: (m,) for P (m,), (N, m) for P (N, m)."""
-        P = self._checked_parameters(P)
-        return np.stack(self._period_values(P)[1:], axis=-1) if self.m else np.zeros(P.shape)
+        return self._period_values(self._checked_parameters(P))[1]
 
     def breaks(self, P: Any) -> Array:
         """Phases in [0, 1) at which F jumps in time, sorted, each once; P (m,)."""
@@ -204,8 +208,8 @@ class Evaluator:
     ) -> None:
         raise NotImplementedError
 
-    def _period_values(self, P: Array) -> list[Array]:
-        """[T, dT/dp_1, ...], each a number or (N,)."""
+    def _period_values(self, P: Array) -> tuple[Array, Array]:
+        """T, a number or (N,), and dT/dp, of the shape of P."""
         raise NotImplementedError
 
     def _break_values(self, P: Array) -> Array:

@@ -104,7 +104,9 @@ class Equations:
         return Program(self.phase, self.states, self.parameters, directions, tuple(assignments), blocks)
 
     def program(self, which: str) -> Program:
-        """The program of "F", "FJ", "FJP", "outputs", "second" or "third"."""
+        """The program of "F", "FJ", "FJP", "outputs", "period", "second" or "third"."""
+        if which == "period":
+            return self.expanded(which)
         assignments, rhs = self._shared
         if which == "F":
             return self._program(assignments, rhs)
@@ -128,6 +130,8 @@ class Equations:
             return self._program((), self.rhs)
         if which == "outputs":
             return self._program((), self.outputs)
+        if which == "period":
+            return self._program((), (self.period,), [differentiate(self.period, p) for p in self.parameters])
         if which in ("FJ", "FJP"):
             blocks = [[differentiate(e, z) for e in self.rhs for z in self.states]]
             if which == "FJP":

@@ -12,7 +12,6 @@ from __future__ import annotations
 import importlib.util
 import threading
 from collections import OrderedDict
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -33,26 +32,21 @@ class ExpressionEvaluator(Evaluator):
         super().__init__(system)
         self._equations = equations
 
-    def _period_values(self, P: Array) -> list[Array]:
-        values = self._small("period")(*(P if P.ndim == 1 else P.T))
-        return [np.broadcast_to(np.asarray(v, dtype=float), P.shape[:-1]) for v in values]
-
     def _break_values(self, P: Array) -> Array:
-        return np.array(self._small("breaks")(*P), dtype=float)
-
-    def _small(self, which: str) -> Callable[..., Any]:
-        """Functions of the parameters only, always by numpy."""
-        code = self._codes.get(which)
+        if not self._equations.breaks:
+            return np.empty(0)
+        code = self._codes.get("breaks")
         if code is None:
             from ._lambdify import numpy_function
-            from .expressions import differentiate
 
-            equations = self._equations
-            expressions = equations.breaks
-            if which == "period":
-                expressions = [equations.period, *(differentiate(equations.period, p) for p in equations.parameters)]
-            code = self._codes[which] = numpy_function(equations.parameters, expressions)
-        return code
+            code = self._codes["breaks"] = numpy_function(self._equations.parameters, self._equations.breaks)
+        return np.array(code(*P), dtype=float)
+
+    def _period_values(self, P: Array) -> tuple[Array, Array]:
+        N = 1 if P.ndim == 1 else len(P)
+        T, gradient = np.empty((N, 1)), np.empty((N, self.m))
+        self._run("period", None, np.empty((N, self.n)), P, (), (T, gradient))
+        return T.reshape(P.shape[:-1]), gradient.reshape(P.shape)
 
 
 class LlvmEvaluator(ExpressionEvaluator):

@@ -103,7 +103,7 @@ def test_lookup_at_and_around_every_breakpoint_is_the_same_in_machine_code():
     table = Table("jagged", breaks, np.random.default_rng(1).normal(size=(4, 4)))
     at = np.concatenate([breaks, np.nextafter(breaks, 9), np.nextafter(breaks, -9), [-1e9, 1e9, np.nan, np.inf]])
     system = System("t", ("x", "v"), ("x", "v"), {}, (v, table(x)))
-    F = evaluator(system, "llvm").F(None, np.stack([at, 0 * at], axis=1), [])
+    F = evaluator(system, "llvm").F(None, np.stack([at, np.zeros_like(at)], axis=1), [])
     np.testing.assert_array_equal(F[:, 1], table.evaluate(at))
 
 
