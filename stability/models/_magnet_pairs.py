@@ -35,6 +35,7 @@ from ._ranges import choice
 __all__ = ["MagnetPair"]
 
 FACING = ("like", "unlike")
+NARROWEST = 1e-8  # gap or clearance over radius below which magnets count as touching
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class MagnetPair:
     def nested(self) -> bool:
         """Whether one magnet fits into the hole of the other."""
         holes = [(a, b) for a, b in ((self.first, self.second), (self.second, self.first)) if isinstance(a, RingMagnet)]
-        return not isinstance(self.first, BlockMagnet) and any(b.size < a.inner_radius for a, b in holes)
+        return not self.blocks and any(b.size < (1.0 - NARROWEST) * a.inner_radius for a, b in holes)
 
     @property
     def blocks(self) -> bool:
@@ -102,9 +103,10 @@ class MagnetPair:
 
     def _gaps(self, gap: Any) -> np.ndarray:
         values = np.asarray(gap, dtype=float)
-        bad = ~np.isfinite(values) if self.nested else ~(np.isfinite(values) & (values > 0.0))
+        limit = -math.inf if self.nested else NARROWEST * max(self.first.size, self.second.size)
+        bad = ~(np.isfinite(values) & (values > limit))
         if np.any(bad):
-            allowed = "finite" if self.nested else "finite and > 0 m, else the magnets touch"
+            allowed = "finite" if self.nested else f"finite and > {limit:g} m, else the magnets touch"
             raise InputError(f"MagnetPair: gap must be {allowed}; got {float(values[bad].flat[0]):g}")
         return values
 
