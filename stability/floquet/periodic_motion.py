@@ -79,7 +79,7 @@ def orbit_motion(orbit: Any, period: Array, name: str) -> Motion:
     if np.abs(ratio - 1.0).max() > 1e-9:
         raise InputError(
             f"the orbit has the period {orbit.period:.9g}, the forcing of '{name}' {period[0]:.9g} here; stability "
-            "over the forcing period needs an orbit of that period at these parameters (give a function of the parameters)"
+            "over the forcing period needs an orbit of that period (give a function of the parameters)"
         )
     samples = 64
     while True:
