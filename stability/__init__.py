@@ -13,7 +13,16 @@ from ._version import __version__ as __version__
 
 # public name -> module that defines it
 _EXPORTS: dict[str, str] = {
+    "switch": "problems.switching",
+    "solve": "following.driver",
+    "continuation": "following.driver",
+    "SpecialPoint": "results.special",
+    "PeriodicOrbit": "results.solutions",
+    "FixedPoint": "results.solutions",
+    "Equilibrium": "problems.equilibria",
+    "Branch": "results.branch",
     "chart": "charting.charts",
+    "StabilityChart": "results.chart",
     "ConstantAcceleration": "systems.excitation",
     "ConstantAmplitude": "systems.excitation",
     "Criticality": "words",
