@@ -92,7 +92,7 @@ def _sympified(expr: Any) -> sp.Basic:
         node = sp.sympify(expr, strict=True)
     except sp.SympifyError:
         raise InputError(f"an expression is needed, not {type(expr).__name__}") from None
-    if not isinstance(node, (sp.Expr, sp.logic.boolalg.Boolean)):
+    if not isinstance(node, (sp.Expr, sp.logic.boolalg.Boolean)) or getattr(node, "is_Matrix", False):
         raise InputError(f"a scalar expression is needed, not {type(node).__name__}")
     return node
 
@@ -115,6 +115,7 @@ def _rebuild(
         pairs = [tuple(_rebuild(part, names, builder, memo, depth + 1) for part in pair.args) for pair in node.args]
         result = builder.piecewise(pairs)
     else:
+        _check_known(node)
         args = [_rebuild(arg, names, builder, memo, depth + 1) for arg in node.args]
         result = _rebuilt_function(node, args, builder)
     memo[node] = result
@@ -129,13 +130,15 @@ def _rebuilt_function(node: sp.Basic, args: list[sp.Basic], builder: Builder) ->
         result = node.func(*args)
         builder.value(result)
         return result
-    rewrite = _REWRITES.get(type(node))
-    if rewrite is not None:
-        return _rebuild(rewrite(*args), None, builder, {}, 0)
-    raise CompileError(
-        f"the function '{type(node).__name__}' in {_shortened(node)} is not among those the library compiles: "
-        f"{', '.join(KINDS)}; write it with these, or give the system as a Python function (System.from_function)"
-    )
+    return _rebuild(_REWRITES[type(node)](*args), None, builder, {}, 0)
+
+
+def _check_known(node: sp.Basic) -> None:
+    if kind_of(node) is None and not isinstance(node, TableFunction) and type(node) not in _REWRITES:
+        raise CompileError(
+            f"the function '{type(node).__name__}' in {_shortened(node)} is not among those the library compiles: "
+            f"{', '.join(KINDS)}; write it with these, or give the system as a Python function (System.from_function)"
+        )
 
 
 def _shortened(node: sp.Basic) -> str:
@@ -230,7 +233,10 @@ def from_tree(tree: Any) -> sp.Basic:
     x**2
     """
     _measure(tree)
-    return _expression(tree, Builder())
+    builder = Builder()
+    node = _expression(tree, builder)
+    builder.value(node)
+    return node
 
 
 def _measure(tree: Any) -> None:
@@ -247,7 +253,9 @@ def _measure(tree: Any) -> None:
             stack.extend((part, depth + 1) for part in item.values())
 
 
-def _expression(tree: Any, builder: Builder) -> sp.Basic:
+def _expression(tree: Any, builder: Builder, depth: int = 0) -> sp.Basic:
+    if depth > MAX_DEPTH:
+        raise FileFormatError(f"an expression tree has more than {MAX_DEPTH} levels")
     if not isinstance(tree, list) or not tree or not isinstance(tree[0], str):
         raise FileFormatError(f"an expression tree must be a list that starts with a kind, not {_shown(tree)}")
     name, entries = tree[0], tree[1:]
@@ -256,18 +264,18 @@ def _expression(tree: Any, builder: Builder) -> sp.Basic:
     if name == "piecewise":
         if not all(isinstance(pair, list) and len(pair) == 2 for pair in entries):
             raise FileFormatError("'piecewise' needs pairs [value, condition]")
-        return builder.piecewise([(_expression(v, builder), _expression(c, builder)) for v, c in entries])
+        return builder.piecewise([tuple(_expression(part, builder, depth + 1) for part in pair) for pair in entries])
     if name == "table":
-        return _table(entries, builder)
+        return _table(entries, builder, depth)
     if name not in KINDS:
         raise FileFormatError(f"unknown kind of node {_shown(name)} in an expression tree")
-    return builder.build(name, [_expression(entry, builder) for entry in entries])
+    return builder.build(name, [_expression(entry, builder, depth + 1) for entry in entries])
 
 
-def _table(entries: list[Any], builder: Builder) -> sp.Basic:
+def _table(entries: list[Any], builder: Builder, depth: int) -> sp.Basic:
     if len(entries) != 2 or not isinstance(entries[0], dict) or not valid_name(entries[0].get("name")):
         raise FileFormatError("'table' needs its data (with a plain name) and one argument")
-    argument = _expression(entries[1], builder)
+    argument = _expression(entries[1], builder, depth + 1)
     if not isinstance(argument, sp.Expr):
         raise ExpressionError("a table takes a number, not a comparison")
     try:
