@@ -1,0 +1,237 @@
+r"""From what the followers found to a frozen `Branch`: arrays, labels, and what is needed to go on later."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..protocols import Tangent
+from ..results.branch import Branch
+from ..results.special import SpecialPoint
+from ..words import Kind, Status, Verdict
+from .follower import Entry, Follower
+from .locating import Found
+from .loops import Home
+from .points import Point, dot, smooth_tests
+from .settings import Settings
+
+__all__ = ["assemble", "resumed"]
+
+Array = NDArray[np.float64]
+_MERGE = 1e-10
+_CRITICAL = (Kind.FOLD, Kind.BRANCH_POINT, Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER, Kind.HOPF)
+
+
+def _merged(entries: list[Entry]) -> list[Entry]:
+    """Without points that repeat their neighbour; what is special about either is kept."""
+    kept: list[Entry] = []
+    for entry in entries:
+        if kept and _same(kept[-1].point, entry.point):
+            if entry.found is None:
+                continue
+            if kept[-1].found is None:
+                kept[-1] = entry
+                continue
+            if entry.found.kind is kept[-1].found.kind:
+                continue
+        kept.append(entry)
+    return kept
+
+
+def _same(p: Point, q: Point) -> bool:
+    if p.u.size != q.u.size or p.problem is not q.problem:
+        return False
+    du = p.u - q.u
+    gap = math.sqrt(dot(p.problem.weights, du, du)) + abs(p.parameter - q.parameter) * p.tangent.weight
+    return gap <= _MERGE
+
+
+def _labelled(settings: Settings, entries: list[Entry]) -> tuple[list[SpecialPoint], list[int]]:
+    counts: dict[Kind, int] = {}
+    special, marks = [], []
+    for entry in entries:
+        found = entry.found
+        if found is None:
+            marks.append(-1)
+            continue
+        counts[found.kind] = counts.get(found.kind, 0) + 1
+        marks.append(len(special))
+        special.append(_special(settings, entry.point, found, f"{found.kind.label}{counts[found.kind]}"))
+    return special, marks
+
+
+def _special(settings: Settings, point: Point, found: Found, label: str) -> SpecialPoint:
+    problem = point.problem
+    return SpecialPoint(
+        kind=found.kind,
+        label=label,
+        params=dict(zip(problem.parameters, point.params.tolist())),
+        solution=problem.view(point.u, point.params),
+        multipliers=point.spectrum.values,
+        bracket=found.bracket,
+        free=settings.name,
+        u=point.u,
+        direction=point.tangent.u,
+        rate=point.tangent.parameter,
+        source=problem,
+        accuracy=found.accuracy,
+        name=found.name,
+    )
+
+
+def _verdict(entry: Entry) -> Verdict:
+    """At a bifurcation a value sits on the limit: unstable if another one is clearly outside, else undetermined."""
+    spectrum, found = entry.point.spectrum, entry.found
+    if found is None or found.kind not in _CRITICAL or not spectrum.values.size:
+        return spectrum.verdict
+    values = spectrum.values
+    circle = entry.point.problem.critical.circle
+    excess = np.abs(values) - 1 if circle else values.real / (np.abs(values).max() or 1.0)
+    return Verdict.UNSTABLE if float(excess.max()) > 1e-5 + 100 * spectrum.error else Verdict.UNDETERMINED
+
+
+def _resume_data(follower: Follower | None) -> dict[str, Any] | None:
+    if follower is None:
+        return None
+    return {"length": float(follower.length), "since_adapt": follower.since_adapt}
+
+
+def assemble(
+    settings: Settings,
+    entries: list[Entry],
+    statuses: tuple[Status, Status],
+    ends: tuple[Follower | None, Follower | None],
+) -> Branch:
+    """The branch that these entries are."""
+    entries = _merged(entries)
+    special, marks = _labelled(settings, entries)
+    points = [e.point for e in entries]
+    meshes: dict[int, Any] = {}
+    mesh_of = []
+    order: dict[int, int] = {}
+    for p in points:
+        key = id(p.problem)
+        if key not in order:
+            order[key] = len(order)
+            meshes[order[key]] = p.problem
+        mesh_of.append(order[key])
+    width = max((p.spectrum.values.size for p in points), default=0)
+    values = np.full((len(points), width), np.nan, dtype=complex)
+    for row, p in zip(values, points):
+        row[: p.spectrum.values.size] = p.spectrum.values
+    first = points[0]
+    s0 = first.s
+    method = {
+        "problem": type(first.problem).__name__,
+        "tolerance": settings.tolerance,
+        "ds": settings.steps.first,
+        "ds_max": settings.steps.longest,
+        "scale": 1.0 / settings.weight,
+        "at": list(settings.at),
+        "resume": [_resume_data(f) for f in ends],
+    }
+    for p in points:
+        for array in (p.u, p.tangent.u):
+            array.setflags(write=False)
+    return Branch(
+        name=settings.name,
+        window=settings.window,
+        parameter=np.array([p.parameter for p in points]),
+        rates=np.array([p.tangent.parameter for p in points]),
+        arclength=np.array([p.s - s0 for p in points]),
+        unknowns=tuple(p.u for p in points),
+        tangents=tuple(p.tangent.u for p in points),
+        meshes=tuple(meshes[i] for i in range(len(meshes))),
+        mesh_of=np.array(mesh_of),
+        params=dict(zip(first.problem.parameters, first.params.tolist())),
+        values=values,
+        value_errors=np.array([p.spectrum.error for p in points]),
+        verdicts=tuple(_verdict(e) for e in entries),
+        residuals=np.array([p.residual for p in points]),
+        iterations=np.array([p.iterations for p in points]),
+        marks=np.array(marks),
+        special=tuple(special),
+        statuses=statuses,
+        method=method,
+    )
+
+
+# ---------------------------------------------------------------------- going on
+def _point_from(branch: Branch, i: int, settings: Settings, step: float, sign: int) -> Point:
+    """A stored point as the driver knew it; its spectrum and determinant are computed again."""
+    problem, u, params = branch._problem(i), branch.unknowns[i], branch._vector(i)
+    direction, rate = branch.tangents[i], float(branch.rates[i])
+    length = math.sqrt(dot(problem.weights, direction, direction) + (rate * settings.weight) ** 2)
+    tangent = Tangent(sign * direction / length, sign * rate / length, settings.weight)
+    again = problem.correct(u, params, settings.name, tangent, 0.0, settings.tolerance)
+    spectrum = problem.spectrum(problem.linearise(u, params))
+    tests = smooth_tests(spectrum.values, problem.critical.circle)
+    s = sign * float(branch.arclength[i])
+    return Point(
+        problem, u, params, float(branch.parameter[i]), tangent, spectrum, tests, again.determinant_sign,
+        float(branch.residuals[i]), int(branch.iterations[i]), s, step,
+    )
+
+
+def _entry_from(branch: Branch, i: int, settings: Settings) -> Entry:
+    point = _point_from(branch, i, settings, 0.0, 1)
+    mark = int(branch.marks[i])
+    if mark < 0:
+        return Entry(point, None)
+    special = branch.special[mark]
+    return Entry(point, Found(point, special.kind, special.bracket, special.accuracy, special.name))
+
+
+def _restarted(branch: Branch, settings: Settings, end: int) -> Follower | None:
+    """A follower that goes on from the last (end 1) or, backwards, from the first point (end 0)."""
+    status, resume = branch.statuses[end], branch.method["resume"][end]
+    at_wall = status is Status.PARAMETER_BOUND
+    i = len(branch) - 1 if end else 0
+    inside = settings.low < branch.parameter[i] < settings.high
+    if resume is None or status is Status.CLOSED_LOOP or (at_wall and not inside):
+        return None
+    sign, inward = (1, -1) if end else (-1, 1)
+    # neighbours as the driver met them: accepted points only
+    k = i + inward
+    while 0 <= k < len(branch) and branch.marks[k] >= 0 and branch.special[branch.marks[k]].kind is not Kind.USER:
+        k += inward
+    before = None
+    step = 0.0
+    last = _point_from(branch, i, settings, 0.0, sign)
+    if 0 <= k < len(branch) and branch.mesh_of[k] == branch.mesh_of[i]:
+        before = _point_from(branch, k, settings, 0.0, sign)
+        du, dl = last.u - before.u, (last.parameter - before.parameter) * settings.weight
+        step = math.sqrt(dot(last.problem.weights, du, du) + dl * dl)
+        last = last._replace(step=step)
+    other = _point_from(branch, 0 if end else len(branch) - 1, settings, 0.0, sign)
+    return Follower(
+        settings, last, before=before, length=float(resume["length"]), since_adapt=int(resume["since_adapt"]),
+        home=Home(other),
+    )
+
+
+def resumed(branch: Branch, settings: Settings) -> Branch:
+    """The branch with more points at every end that can go on (see `Branch.extend`)."""
+    entries = [_entry_from(branch, i, settings) for i in range(len(branch))]
+    followers: list[Follower | None] = [_restarted(branch, settings, end) for end in (0, 1)]
+    statuses = list(branch.statuses)
+    for end, follower in enumerate(followers):
+        if follower is None:
+            continue
+        follower.run()
+        statuses[end] = follower.status or Status.STEP_TOO_SMALL
+        new = follower.entries
+        if end:
+            entries = entries + new
+        else:
+            entries = [_reversed(e) for e in reversed(new)] + entries
+    return assemble(settings, entries, (statuses[0], statuses[1]), (followers[0], followers[1]))
+
+
+def _reversed(entry: Entry) -> Entry:
+    p = entry.point
+    t = Tangent(-p.tangent.u, -p.tangent.parameter, p.tangent.weight)
+    return Entry(p._replace(tangent=t, s=-p.s), entry.found)

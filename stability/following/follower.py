@@ -1,0 +1,336 @@
+r"""One side of a branch, point by point: predict, correct, check, detect, locate, adapt, stop.
+
+`Follower` is an iterator over accepted points; everything found so far is in its `entries`, in order, whatever ends the
+iteration. Walls are hard: a step whose prediction or result lies beyond a window end is replaced by a solve *at* that
+end. The mesh is adapted at accepted points only, after the segment behind them has been searched, so that both ends of
+a segment always share a mesh; an adaption that would change the counts (an event within the discretisation error of
+this point) is put off to the next point.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from ..protocols import Corrected, Tangent
+from ..words import Kind, Status
+from .events import changes, double_turn, parabola_dip
+from .locating import Found, Locator, chord_length
+from .loops import Home
+from .points import Point, dot, make_point
+from .settings import Progress, Settings
+from .stepping import KINK, Comparison, compare, next_length, predict
+
+__all__ = ["Entry", "Follower"]
+
+_ADAPT_EVERY = 3
+_GROWTH = 1e6
+_STALL_POINTS, _STALL = 150, 1e-10
+_DIP = 0.15
+
+
+class Entry(NamedTuple):
+    """A point of the branch; `found` tells what is special about it."""
+
+    point: Point
+    found: Found | None
+
+
+class Follower(Iterator[Point]):
+    """Follows one side of a branch from a first point whose tangent shows the way."""
+
+    def __init__(
+        self, settings: Settings, first: Point, *, before: Point | None = None, length: float | None = None,
+        since_adapt: int = 0, home: Home | None = None, limit: int | None = None, special_so_far: int = 0,
+    ) -> None:
+        self.settings, self.last, self.before = settings, first, before
+        self.length = settings.steps.first if length is None else length
+        self.since_adapt = since_adapt
+        self.limit = settings.max_points if limit is None else limit
+        self.entries: list[Entry] = []
+        self.status: Status | None = None
+        self.accepted = 0
+        self.special = special_so_far
+        self.home = Home(first) if home is None else home
+        self.locator = Locator(settings.name, settings.index, settings.tolerance, settings.steps.shortest)
+        self._growth = 1.0
+        self._norm = self._norm_of(first)
+        self._extent: list[float] = []
+        self._event_values = [f(first.problem.view(first.u, first.params)) for _, f in settings.events]
+        self._seen: dict[str, int] = {}
+
+    # ------------------------------------------------------------------ iteration
+    def __iter__(self) -> Follower:
+        return self
+
+    def __next__(self) -> Point:
+        if self.status is not None:
+            raise StopIteration
+        if len(self.entries) >= self.limit:
+            self.status = Status.MAX_POINTS
+            raise StopIteration
+        step = self._advance()
+        if step is None:
+            raise StopIteration
+        point, seen = step
+        self._take(point, seen)
+        if self.settings.progress is not None:
+            found = sum(e.found is not None for e in self.entries)
+            self.settings.progress(Progress(len(self.entries), point.parameter, self.length, found))
+        return point
+
+    def run(self) -> Follower:
+        """Follow to the end; an interrupt from the keyboard ends the branch and keeps it."""
+        try:
+            for _ in self:
+                pass
+        except KeyboardInterrupt:
+            self.status = Status.STOPPED
+        return self
+
+    # ------------------------------------------------------------------ one step
+    def _advance(self) -> tuple[Point, Comparison] | None:
+        h = min(self.length, self.settings.steps.longest)
+        while h >= self.settings.steps.shortest:
+            found = self._try(h)
+            if isinstance(found, tuple):
+                return found
+            h *= found
+        self.status = Status.STEP_TOO_SMALL
+        return None
+
+    def _try(self, h: float) -> tuple[Point, Comparison] | float:
+        """An accepted point, or the factor by which to shorten the step."""
+        settings, last = self.settings, self.last
+        u, parameter = predict(last, self.before, h)
+        wall = self._wall(parameter)
+        if wall is not None:
+            return self._land(wall, h)
+        params = last.params.copy()
+        params[settings.index] = parameter
+        found = last.problem.correct(u, params, settings.name, last.tangent, 0.0, settings.tolerance)
+        if not found.converged or found.tangent is None:
+            return 0.4
+        wall = self._wall(float(found.params[settings.index]))
+        if wall is not None:
+            return self._land(wall, h)
+        return self._judged(found, found.tangent, h)
+
+    def _wall(self, parameter: float) -> float | None:
+        if parameter < self.settings.low:
+            return self.settings.low
+        return self.settings.high if parameter > self.settings.high else None
+
+    def _land(self, wall: float, h: float) -> tuple[Point, Comparison] | float:
+        """Solve at the window end itself, if it is about one step away."""
+        settings, last = self.settings, self.last
+        rate = last.tangent.parameter
+        if last.parameter == wall:
+            return 0.5 if rate * (wall - 0.5 * (settings.low + settings.high)) < 0 else 0.25
+        reach = (wall - last.parameter) / rate if rate else math.inf
+        if not 0 < reach <= 2 * h:
+            return 0.5
+        u, _ = predict(last, self.before, reach)
+        params = last.params.copy()
+        params[settings.index] = wall
+        found = last.problem.correct(u, params, settings.name, None, 0.0, settings.tolerance)
+        if not found.converged or found.tangent is None:
+            return 0.5
+        slope, weight, w = found.tangent, settings.weight, last.problem.weights
+        size = math.sqrt(dot(w, slope.u, slope.u) + weight**2)
+        side = dot(w, slope.u, last.tangent.u) + weight**2 * rate
+        size = math.copysign(size, side)
+        tangent = Tangent(slope.u / size, 1.0 / size, weight)
+        signed = found._replace(determinant_sign=found.determinant_sign * (1 if size > 0 else -1))
+        return self._judged(signed, tangent, reach)
+
+    def _judged(self, found: Corrected, tangent: Tangent, h: float) -> tuple[Point, Comparison] | float:
+        last, settings = self.last, self.settings
+        point = make_point(last.problem, found, tangent, settings.index, last.s, h)
+        seen = compare(last, point.u, point.parameter, tangent, point.spectrum.values)
+        point = point._replace(s=last.s + seen.distance, step=seen.distance)
+        if seen.worst > 1 and not h < KINK * settings.steps.longest:
+            return max(0.25, 0.8 / seen.worst)
+        if seen.distance > 3 * h or seen.distance == 0:
+            return 0.4
+        return point, seen
+
+    # ------------------------------------------------------------------ after a step
+    def _take(self, point: Point, seen: Comparison) -> None:
+        settings, last = self.settings, self.last
+        closed = self.home.reached(last, point, self.locator, self.accepted)
+        if closed is not None:
+            point = closed
+        found = self._search(last, point)
+        if self._stops(found):
+            return
+        at_point = self._value_at(point)
+        self.entries.append(Entry(point, at_point))
+        self.special += at_point is not None
+        self.accepted += 1
+        self.length = next_length(seen.distance, seen, point.iterations, settings.steps)
+        if at_point is not None and self._named_stop(at_point):
+            self.status = Status.STOPPED
+        elif closed is not None:
+            self.status = Status.CLOSED_LOOP
+        elif point.parameter in settings.window:
+            self.status = Status.PARAMETER_BOUND
+        elif self._runaway(point):
+            self.status = Status.DIVERGED
+        self.before, self.last = last, point
+        self.since_adapt += 1
+        if self.since_adapt >= _ADAPT_EVERY and self.status is None:
+            self._adapt()
+
+    def _value_at(self, point: Point) -> Found | None:
+        if point.parameter not in self.settings.at:
+            return None
+        return Found(point, Kind.USER, (point.parameter, point.parameter), 0.0)
+
+    def _stops(self, found: list[Found]) -> bool:
+        """Append what was found; True if the branch ends at one of them."""
+        for one in found:
+            previous = self.entries[-1].point if self.entries else self.last
+            point = one.point._replace(step=max(one.point.s - previous.s, 0.0))
+            self.entries.append(Entry(point, one._replace(point=point)))
+            self.special += 1
+            if self._named_stop(one):
+                self.status = Status.STOPPED
+                self.before, self.last = None, point
+                return True
+        self.entries.sort(key=lambda e: e.point.s)
+        return False
+
+    def _named_stop(self, found: Found) -> bool:
+        prefix = found.kind.label
+        self._seen[prefix] = self._seen.get(prefix, 0) + 1
+        return bool({prefix, f"{prefix}{self._seen[prefix]}", found.name} & set(self.settings.stop_at))
+
+    def _runaway(self, point: Point) -> bool:
+        size = self._norm_of(point)
+        self._extent.append(point.parameter)
+        if not math.isfinite(size) or self._growth * size > _GROWTH * max(1.0, self._norm):
+            return True
+        recent = self._extent[-_STALL_POINTS:]
+        return len(recent) == _STALL_POINTS and max(recent) - min(recent) < _STALL / self.settings.weight
+
+    @staticmethod
+    def _norm_of(point: Point) -> float:
+        return math.sqrt(dot(point.problem.weights, point.u, point.u))
+
+    def _adapt(self) -> None:
+        settings, old = self.settings, self.last
+        better = old.problem.adapt(old.u, old.params, old.tangent)
+        if better is None:
+            self.since_adapt = 0
+            return
+        problem, u, tangent = better
+        found = problem.correct(u, old.params, settings.name, tangent, 0.0, settings.tolerance)
+        if not found.converged or found.tangent is None:
+            return
+        parameter = float(found.params[settings.index])
+        if self._wall(parameter) is not None:
+            return
+        new = make_point(problem, found, found.tangent, settings.index, old.s, old.step)
+        if not changes(old, new).nothing:
+            return  # an event lies within the discretisation error: leave the mesh until it is passed
+        self._growth *= self._norm_of(old) / max(self._norm_of(new), 1e-300)
+        self.since_adapt = 0
+        self.last, self.before = new, None
+        where = max(i for i, e in enumerate(self.entries) if e.point is old)
+        self.entries[where] = Entry(new, self.entries[where].found)
+
+    # ------------------------------------------------------------------ events of a segment
+    def _search(self, a: Point, b: Point) -> list[Found]:
+        """Everything special strictly between a and b (and, late, between the point before and a)."""
+        found = self.locator.resolve(a, b)
+        if not found:
+            found = self._dips(a, b)
+        own = [f for f in found if f.point.s >= a.s]
+        knots = [a, *(f.point for f in sorted(own, key=lambda f: f.point.s)), b]
+        if self.settings.at:
+            found += self._values(knots)
+        if self.settings.events:
+            found += self._user_events(knots)
+        return sorted(found, key=lambda f: f.point.s)
+
+    def _values(self, knots: list[Point]) -> list[Found]:
+        found = []
+        for p, q in pairwise(knots):
+            for value in self.settings.at:
+                if (p.parameter - value) * (q.parameter - value) < 0:
+                    point = self.locator.at_parameter(p, q, value)
+                    if point is None:
+                        point = self.locator.zero(
+                            p, q, lambda z, v=value: z.parameter - v, p.parameter - value, q.parameter - value
+                        )
+                    if point is not None:
+                        found.append(Found(point, Kind.USER, (p.parameter, q.parameter), 0.0))
+        return found
+
+    def _user_events(self, knots: list[Point]) -> list[Found]:
+        found = []
+        for k, (name, function) in enumerate(self.settings.events):
+
+            def value_of(z: Point, f: Callable[..., float] = function) -> float:
+                return float(f(z.problem.view(z.u, z.params)))
+
+            values = [self._event_values[k], *(value_of(p) for p in knots[1:])]
+            self._event_values[k] = values[-1]
+            for (p, gp), (q, gq) in zip(zip(knots, values), zip(knots[1:], values[1:])):
+                if gp * gq < 0:
+                    point = self.locator.zero(p, q, value_of, gp, gq)
+                    if point is not None:
+                        found.append(Found(point, Kind.USER, (p.parameter, q.parameter), 0.0, name))
+        return found
+
+    def _dips(self, a: Point, b: Point) -> list[Found]:
+        """In-and-out changes that the integers at a and b do not show."""
+        x = double_turn(a, b)
+        if x is not None:
+            middle = self.locator.on_curve(a, b, (x - a.s) / (b.s - a.s))
+            if middle is not None:
+                found = self.locator.resolve(a, middle) + self.locator.resolve(middle, b)
+                if found:
+                    return found
+        p = self.before
+        if p is None or p.problem is not a.problem or not b.spectrum.values.size:
+            return []
+        critical = a.problem.critical
+        wanted = [0] + [1] * (critical.minus is not None) + [2] * (critical.pair is not None)
+        for which in wanted:
+            dip = parabola_dip((p, a, b), which)
+            if dip is not None and dip[1] < _DIP:
+                ends = (a, b) if dip[0] > a.s else (p, a)
+                found = self._refine(*ends, which, dip[0])
+                if found:
+                    return found
+        return []
+
+    def _refine(self, a: Point, b: Point, which: int, x: float) -> list[Found]:
+        """Follow the vertex of the parabola into the segment until it crosses zero or is seen not to."""
+        for _ in range(8):
+            width = b.s - a.s
+            if width <= 0 or chord_length(a, b) < 1e-7:
+                break
+            middle = self.locator.on_curve(a, b, min(0.98, max(0.02, (x - a.s) / width)))
+            if middle is None:
+                break
+            if not (changes(a, middle).nothing and changes(middle, b).nothing):
+                return self.locator.resolve(a, middle) + self.locator.resolve(middle, b)
+            dip = parabola_dip((a, middle, b), which)
+            if dip is None or dip[1] > 0.5 or not np.isfinite(dip[0]):
+                break
+            if abs(dip[0] - middle.s) < 0.01 * width:
+                # the vertex is sampled; narrow around it once more only if it is nearly zero
+                if dip[1] > 1e-3 * 1.0 and dip[1] > 0.9:
+                    break
+                a, b = (a, middle) if dip[0] < middle.s else (middle, b)
+            else:
+                a, b = (middle, b) if dip[0] > middle.s else (a, middle)
+            x = dip[0]
+        return []

@@ -1,0 +1,128 @@
+r"""A special point of a branch: where the number or the stability of solutions changes, located and labelled.
+
+At a fold and at a branch point F_u is singular (multiplier +1, eigenvalue 0); at a period doubling a multiplier is -1;
+at a Neimark-Sacker point a pair is exp(+-i theta); at a Hopf point a pair of eigenvalues is +-i omega.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import FileFormatError
+from ..words import Criticality, Kind
+from .revival import revive
+from .solutions import FixedPoint, PeriodicOrbit, frozen
+from .storage import register, write
+
+__all__ = ["SpecialPoint"]
+
+_SOLUTIONS: dict[str, Any] = {"fixed-point": FixedPoint, "periodic-orbit": PeriodicOrbit}
+
+
+@register("special-point")
+@dataclass(frozen=True, eq=False, repr=False)
+class SpecialPoint:
+    """A located event on a branch.
+
+    Attributes
+    ----------
+    kind : Kind;  label : str, such as ``LP1``;  name : str, of a user's event
+    params : mapping of all parameter values
+    solution : FixedPoint or PeriodicOrbit
+    multipliers : (n,) complex, multipliers of an orbit or eigenvalues of an equilibrium
+    bracket : (float, float), values of the continued parameter at the points between which it was found
+    accuracy : float, last Newton update in the scaled norm (the error left is about its square)
+    criticality : Criticality or None;  coefficient : float or None, of the normal form
+    free : str, the continued parameter
+    u, direction : (N,) the problem's unknowns there and the direction of the branch in them;  rate : float, the
+        parameter's part of the direction
+    """
+
+    kind: Kind
+    label: str
+    params: Mapping[str, float]
+    solution: Any
+    multipliers: NDArray[np.complex128]
+    bracket: tuple[float, float]
+    free: str
+    u: NDArray[np.float64]
+    direction: NDArray[np.float64]
+    rate: float
+    source: Any = field(repr=False)  # the problem, or its spec after `load`
+    accuracy: float = 0.0
+    name: str = ""
+    criticality: Criticality | None = None
+    coefficient: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kind", Kind(self.kind))
+        object.__setattr__(self, "params", MappingProxyType({k: float(v) for k, v in self.params.items()}))
+        for key, dtype in (("multipliers", complex), ("u", float), ("direction", float)):
+            object.__setattr__(self, key, frozen(getattr(self, key), dtype))
+        low, high = self.bracket
+        object.__setattr__(self, "bracket", (float(low), float(high)))
+        if self.criticality is not None:
+            object.__setattr__(self, "criticality", Criticality(self.criticality))
+
+    @property
+    def problem(self) -> Any:
+        """The problem on whose mesh it was located (rebuilt from its description after `load`)."""
+        return revive(self.source) if isinstance(self.source, Mapping) else self.source
+
+    @property
+    def eigenvalues(self) -> NDArray[np.complex128]:
+        """The same as `multipliers` (the word for equilibria)."""
+        return self.multipliers
+
+    @property
+    def params_vector(self) -> NDArray[np.float64]:
+        """(m,) parameter values in the problem's order."""
+        return np.array(list(self.params.values()))
+
+    def __repr__(self) -> str:
+        named = f" '{self.name}'" if self.name else ""
+        tail = f" | {self.criticality}" if self.criticality else ""
+        return f"{self.label} {self.kind}{named} at {self.free} = {self.params[self.free]:.10g}{tail}"
+
+    def to_storage(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """Header and arrays for `results.storage.write`."""
+        solution, arrays = self.solution.to_storage()
+        header = {
+            "kind": str(self.kind),
+            "label": self.label,
+            "params": dict(self.params),
+            "bracket": list(self.bracket),
+            "free": self.free,
+            "rate": float(self.rate),
+            "accuracy": float(self.accuracy),
+            "name": self.name,
+            "criticality": None if self.criticality is None else str(self.criticality),
+            "coefficient": self.coefficient,
+            "source": dict(self.source if isinstance(self.source, Mapping) else self.source.spec),
+            "solution": solution,
+        }
+        own = {"multipliers": self.multipliers, "u": self.u, "direction": self.direction}
+        return header, own | {f"solution.{k}": a for k, a in arrays.items()}
+
+    @classmethod
+    def from_storage(cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> SpecialPoint:
+        """The inverse of `to_storage`."""
+        fields = dict(header)
+        stored = fields.pop("solution")
+        if stored.get("type") not in _SOLUTIONS:
+            raise FileFormatError(f"a special point's solution is of unknown type {stored.get('type')!r}")
+        inner = {k.removeprefix("solution."): a for k, a in arrays.items() if k.startswith("solution.")}
+        solution = _SOLUTIONS[stored["type"]].from_storage(stored, inner)
+        own = {k: arrays[k] for k in ("multipliers", "u", "direction")}
+        return cls(solution=solution, **own, **fields)
+
+    def save(self, path: Any) -> None:
+        """Write to a ``.npz`` file that `stability.load` reads."""
+        header, arrays = self.to_storage()
+        write(path, "special-point", header, arrays)
