@@ -35,6 +35,8 @@ _EXPORTS: dict[str, str] = {
     "mathieu_a_of_exponent": "floquet.exponents",
     "mathieu_b": "floquet.mathieu",
     "mathieu_exponent": "floquet.exponents",
+    "Monodromy": "floquet.period_maps",
+    "monodromy": "floquet.period_maps",
     "Status": "words",
     "System": "systems.system",
     "Verdict": "words",

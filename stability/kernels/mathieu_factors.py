@@ -178,4 +178,11 @@ def _tail(a: Any, q: Any, t0: float) -> Any:
     for back in range(_BACK, -1, -1):
         t = (nodes - back)[:, None]
         change = -quarter / (t * t) - strength / ((t * (t - 1.0)) ** 2 * (1.0 + change))
-    return weights @ np.log1p(change)
+    return weights @ _log1p(change)
+
+
+def _log1p(x: Any) -> Any:
+    """``log(1 + x)`` with relative accuracy for small x; numpy's own loses it for complex arguments."""
+    if x.dtype.kind != "c":
+        return np.log1p(x)
+    return 0.5 * np.log1p(2.0 * x.real + x.real**2 + x.imag**2) + 1j * np.arctan2(x.imag, 1.0 + x.real)
