@@ -30,7 +30,7 @@ from ..protocols import Corrected, Critical, Seed, Spectrum, Tangent
 from ..results.solutions import PeriodicOrbit
 from ..words import Kind
 from .collocation_linearisation import CollocationLinearisation, Workspace
-from .orbit_field import OrbitField
+from ..integration.compiled import CompiledField
 from .orbit_adaption import adapted
 from .orbit_measures import orbit_measures, orbit_view
 from .orbit_mesh import OrbitMesh
@@ -109,7 +109,7 @@ class Collocation:
             raise InputError(f"accuracy = {self.accuracy!r}: a positive number is needed (1e-9 is the default)")
         symmetric = self.symmetry is not None
         object.__setattr__(self, "span", self.multiple * (0.5 if symmetric else 1.0))
-        matrix = np.eye(n) if not symmetric else np.asarray(self.symmetry, float)
+        matrix = np.array(self.symmetry, float) if symmetric else np.eye(n)
         if matrix.shape != (n, n) or not abs(np.linalg.det(matrix)) > 1e-12:
             raise InputError(f"symmetry must be a regular ({n}, {n}) matrix, got shape {matrix.shape}")
         scales = np.ones(n) if self.scales is None else np.array(self.scales, float)
@@ -121,7 +121,8 @@ class Collocation:
             edges = np.array(self.edges, float)
             if edges.ndim != 1 or len(edges) < 2 or not (np.diff(edges) > 0).all() or edges[0] != 0 or edges[-1] != 1:
                 raise InputError("edges must ascend from 0 to 1")
-        for name, value in (("symmetry", matrix), ("scales", scales), ("edges", edges)):
+        object.__setattr__(self, "symmetry", matrix if symmetric else None)
+        for name, value in (("closure", matrix), ("scales", scales), ("edges", edges)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         object.__setattr__(self, "winding", self._winding_vector())
@@ -158,11 +159,12 @@ class Collocation:
     # ------------------------------------------------------------------ what the problem is
     mesh: OrbitMesh = field(init=False, repr=False)
     span: float = field(init=False, repr=False)
+    closure: Array = field(init=False, repr=False)
 
     @cached_property
-    def flow(self) -> OrbitField:
+    def flow(self) -> CompiledField:
         """The compiled field of the system and its forcing period."""
-        return OrbitField.of(self.system)
+        return CompiledField.of(self.system)
 
     @property
     def evaluations(self) -> Any:
@@ -191,9 +193,7 @@ class Collocation:
 
     def index(self, name: str) -> int:
         """Place of a parameter in p."""
-        if name not in self.flow.places:
-            raise unknown_name("parameter", name, self.parameters)
-        return self.flow.places[name]
+        return self.flow.place(name)
 
     @cached_property
     def quadrature(self) -> Array:
@@ -257,7 +257,7 @@ class Collocation:
         rule, weight_T = mesh.rule, self.period_scale**-2 * mesh.own
         status, iterations, residual, sign, du, dY, dl, t_period, t_parameter = kernels.newton(
             self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.matrix,
-            rule.row_sums, rule.update, self.kept, self.position, self.symmetry, self.winding, self.scales, weights,
+            rule.row_sums, rule.update, self.kept, self.position, self.closure, self.winding, self.scales, weights,
             weight_T, params, index, nodes, stages, work.T, arc, t_nodes, t_stages, t_T, t_l, weight, float(ds),
             float(tolerance), limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU, work.pivots,
             work.Z, work.M,
@@ -299,7 +299,7 @@ class Collocation:
         stage, node = np.empty_like(stages), np.empty_like(nodes)
         _, sigma = kernels.evaluate(
             self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.update,
-            self.symmetry, self.winding, self.scales, params, nodes, stages, work.T, work.F, work.J, work.Fp, work.dT,
+            self.closure, self.winding, self.scales, params, nodes, stages, work.T, work.F, work.J, work.Fp, work.dT,
             stage, node,
         )  # fmt: skip
         sign = 0.0
@@ -400,7 +400,7 @@ class Collocation:
         from ..kernels.condensation_reduced import monodromy_product
 
         product = monodromy_product(factors)
-        return np.asarray(np.linalg.solve(self.symmetry, product) * self.scales / self.scales[:, None])
+        return np.asarray(np.linalg.solve(self.closure, product) * self.scales / self.scales[:, None])
 
     def _direction_of_flow(self, linearisation: CollocationLinearisation) -> Array:
         """f at phase zero over the scales: the direction of the trivial multiplier."""

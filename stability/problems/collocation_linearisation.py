@@ -97,7 +97,7 @@ class CollocationLinearisation:
         stage = np.einsum("ik,jkn->jin", W, inner - nodes[:-1, None, :]) - field_part
         node = np.empty_like(nodes)
         node[:-1] = nodes[1:] - (1 - d.sum()) * nodes[:-1] - np.einsum("i,jin->jn", d, inner)
-        node[-1] = nodes[-1] - self.problem.symmetry @ nodes[0] - self.problem.winding
+        node[-1] = nodes[-1] - self.problem.closure @ nodes[0] - self.problem.winding
         return mesh.join(node, stage, 0.0)
 
     def _stage_column(self, free: int) -> Array:
@@ -146,7 +146,7 @@ class CollocationLinearisation:
             return out
         solve_stages(*self._factors(), X)
         du, dY, dl, sign = reduce_and_solve(
-            mesh.rule.update, self.work.Z, self.work.M, X, nodes, all_rows, node_rows, corners, problem.symmetry, 0
+            mesh.rule.update, self.work.Z, self.work.M, X, nodes, all_rows, node_rows, corners, problem.closure, 0
         )
         if sign != 0.0:
             for k in range(sides):
@@ -164,7 +164,7 @@ class CollocationLinearisation:
     def spectral(self) -> Array:
         """M = D^-1 S^-1 Phi D."""
         D = self.problem.scales
-        return np.asarray(np.linalg.solve(self.problem.symmetry, self.fundamental) * D / D[:, None])
+        return np.asarray(np.linalg.solve(self.problem.closure, self.fundamental) * D / D[:, None])
 
     def _variation(self, start: Array, tau: float, free: int, amount: float) -> tuple[Array, Array]:
         """Nodes (N + 1, n), stages (N, mn) of the variation with dx(0) = start, dT = tau, dp_free = amount."""
@@ -183,7 +183,7 @@ class CollocationLinearisation:
     def _end(self, nodes: Array, stages: Array) -> Array:
         """The core equations of a variation that satisfies the inner ones: (k,)."""
         problem, D = self.problem, self.problem.scales
-        gap = np.linalg.solve(problem.symmetry, nodes[-1]) - nodes[0]
+        gap = np.linalg.solve(problem.closure, nodes[-1]) - nodes[0]
         if not self.mesh.own:
             return np.asarray(gap / D)
         return np.append(gap / D, (self.phase_row * stages).sum())
@@ -212,7 +212,7 @@ class CollocationLinearisation:
         n = self.mesh.n
         out = np.zeros(self.mesh.size, dtype=np.result_type(w, float))
         nodes, _, rest = self.mesh.split(out)
-        nodes[-1] = self.problem.symmetry @ (self.problem.scales * w[:n])
+        nodes[-1] = self.problem.closure @ (self.problem.scales * w[:n])
         rest[:] = w[n:]
         return out
 
@@ -254,7 +254,7 @@ class CollocationLinearisation:
         N, count, D = mesh.intervals, mesh.intervals * mesh.degree, problem.scales
         tau, amount = (float(v[n]) * self.period if own else 0.0), float(v[-1])
         _, V = self._variation(D * v[:n], tau, free, amount)
-        eta = np.linalg.solve(problem.symmetry.T, w[:n] / D)
+        eta = np.linalg.solve(problem.closure.T, w[:n] / D)
         rho = self.phase_row * float(w[n]) if own else np.zeros((N, mesh.degree * n))
         A, h, sigma, J, kept, position, LU, pivots = self._factors()
         omega = adjoint_sweep(

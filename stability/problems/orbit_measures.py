@@ -41,7 +41,7 @@ def pieces(problem: Collocation, u: Array, params: Array) -> tuple[int, Array, A
     nodes, stages, rest = mesh.split(u)
     values, edges = mesh.polynomial(nodes, stages), mesh.edges
     if problem.halved:
-        values = np.concatenate([values, values @ problem.symmetry.T + problem.winding])
+        values = np.concatenate([values, values @ problem.closure.T + problem.winding])
         edges = np.concatenate([edges / 2, 0.5 + edges[1:] / 2])
     period = float(rest[0]) if mesh.own else problem.multiple * problem.evaluations.period(params)
     return mesh.degree, edges, values, period

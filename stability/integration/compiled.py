@@ -1,8 +1,8 @@
-"""What a discretisation of orbits needs of a system: addresses, forcing period, breaks, which equations are x' = v.
+"""What compiled kernels need of a system: addresses, forcing period, breaks, which equations are x' = v.
 
 The forcing period T(p) with its gradient is handed to kernels as a field of one state by the same C signature as the
 system itself (F = T, Fp = dT/dp): machine code where the period is an expression, a callback where it is a Python
-function. An `OrbitField` keeps the owners of both addresses alive.
+function. An `CompiledField` keeps the owners of both addresses alive.
 """
 
 from __future__ import annotations
@@ -14,17 +14,18 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import unknown_name
 from ..systems.evaluators import evaluator
 
-__all__ = ["OrbitField"]
+__all__ = ["CompiledField"]
 
 Array = np.ndarray
 _KINDS = [ctypes.c_int64] + [ctypes.c_void_p] * 3 + [ctypes.c_int64] + [ctypes.c_void_p] * 3
-_KNOWN: weakref.WeakValueDictionary[Any, OrbitField] = weakref.WeakValueDictionary()
+_KNOWN: weakref.WeakValueDictionary[Any, CompiledField] = weakref.WeakValueDictionary()
 
 
 @dataclass(frozen=True, eq=False)
-class OrbitField:
+class CompiledField:
     """Compiled field and period of one system.
 
     Attributes
@@ -49,6 +50,12 @@ class OrbitField:
         """Whether the system has a forcing period."""
         return bool(self.evaluations.forced)
 
+    def place(self, name: str) -> int:
+        """Index of a parameter in p."""
+        if name not in self.places:
+            raise unknown_name("parameter", name, self.places)
+        return self.places[name]
+
     def breaks(self, params: Array) -> Array:
         """Phases in [0, 1) where the field jumps."""
         return np.asarray(self.evaluations.breaks(params))
@@ -68,7 +75,7 @@ class OrbitField:
         return np.asarray((slope(up) - slope(down)) / (2 * step))
 
     @classmethod
-    def of(cls, system: Any) -> OrbitField:
+    def of(cls, system: Any) -> CompiledField:
         """The field of a system, made once."""
         known = _KNOWN.get(system)
         if known is None:
@@ -76,7 +83,7 @@ class OrbitField:
         return known
 
     @classmethod
-    def _made(cls, system: Any) -> OrbitField:
+    def _made(cls, system: Any) -> CompiledField:
         evaluations = evaluator(system)
         kept, position = _kinematics(system)
         places = {name: k for k, name in enumerate(system.parameters)}

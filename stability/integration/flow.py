@@ -1,0 +1,158 @@
+"""The flow of a system and its derivatives: initial value problems to a given tolerance.
+
+    x' = f(t, x, p), x(t_0) = x_0;      Phi' = J Phi, Phi(t_0) = I;      (dx/dp)' = J dx/dp + df/dp
+
+The derivative by a parameter of a forced system is taken at fixed phase t / T(p), where it does not grow with t through
+T(p) alone. An interval is cut at the jumps of the right-hand side in time; each piece is one compiled call
+(kernels/runge_kutta.py), order 8 with dense output of order 7. `pieces` is the place where events and saltation enter:
+a piece ends at an event, the state and the variations are mapped, and the next piece starts from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import ConvergenceError, InputError, NonFiniteError
+from ..kernels import runge_kutta
+from .compiled import CompiledField
+
+__all__ = ["Flow", "flow"]
+
+Array = np.ndarray
+_MAX_STEPS = 1_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """The end of an integration and, where asked for, everything between.
+
+    Attributes
+    ----------
+    t : float, the end;  x : (n,) state there;  steps : int
+    matrix : (n, n) dx(t)/dx_0, or None
+    by_parameter : (n, q) dx(t)/dp at fixed phase, or None
+    """
+
+    t: float
+    x: Array
+    steps: int
+    matrix: Array | None = None
+    by_parameter: Array | None = None
+    _dense: tuple[Array, Array] | None = field(default=None, repr=False)
+
+    def __call__(self, t: Any) -> Array:
+        """x(t): (n,) for a number, (n, N) for an array of times inside the interval (only with dense=True)."""
+        if self._dense is None:
+            raise InputError("this flow was integrated without dense output: pass dense=True")
+        times = np.atleast_1d(np.asarray(t, float)).ravel()
+        out = np.empty((len(times), len(self.x)))
+        runge_kutta.interpolate(self._dense[0], self._dense[1], times, out)
+        return np.asarray(out.T.reshape(len(self.x), *np.shape(t)))
+
+
+def pieces(compiled: CompiledField, t0: float, t1: float, period: float, breaks: Array) -> Iterator[tuple[float, float]]:
+    """[t0, t1] cut at the breaks (phases) of a forced field."""
+    if not len(breaks):
+        yield t0, t1
+        return
+    first, last = np.floor(t0 / period), np.ceil(t1 / period)
+    inner = ((np.arange(first, last + 1)[:, None] + breaks).ravel()) * period
+    tiny = 1e-12 * max(abs(t0), abs(t1), period)
+    corners = np.concatenate([[t0], np.sort(inner[(inner > t0 + tiny) & (inner < t1 - tiny)]), [t1]])
+    yield from zip(corners[:-1].tolist(), corners[1:].tolist())
+
+
+def flow(
+    system: Any, span: tuple[float, float], x0: Any, params: Array | None = None, *, rtol: float = 1e-10,
+    atol: Any = 1e-12, variations: bool = False, parameters: Sequence[str] = (), dense: bool = False,
+    max_steps: int = _MAX_STEPS,
+) -> Flow:  # fmt: skip
+    """Integrate from span[0] to span[1] > span[0].
+
+    Parameters
+    ----------
+    system : System
+    span : (t0, t1)
+    x0 : state (mapping of names, missing ones zero, or array (n,))
+    params : (m,) parameter values, default those of the system
+    rtol, atol : relative and absolute (number or (n,)) tolerance of the state; variations are held to the same relative
+        tolerance
+    variations : True gives `matrix`;  parameters : names for `by_parameter`;  dense : True makes the result callable
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        Before any work.
+    NonFiniteError, ConvergenceError
+        The solution leaves the finite range, or the step becomes too small (both carry t and x of the last good step).
+
+    Examples
+    --------
+    >>> import numpy as np, stability as st
+    >>> end = flow(st.models.mathieu(a=1.0, b=0.0, delta=0.0), (0.0, np.pi), dict(q=1.0), variations=True)
+    >>> np.round(end.matrix, 8) + 0.0
+    array([[-1.,  0.],
+           [ 0., -1.]])
+    """
+    compiled = CompiledField.of(system)
+    params = system.parameter_vector() if params is None else np.array(params, float)
+    x = system.state_vector(x0)
+    n, (t0, t1) = len(x), (float(span[0]), float(span[1]))
+    if not (np.isfinite(t0) and np.isfinite(t1) and t1 > t0):
+        raise InputError(f"span = ({t0:g}, {t1:g}): two ascending finite times are needed")
+    if not 1e-15 < rtol < 1 or not (np.asarray(atol, float) > 0).all():
+        raise InputError(f"rtol = {rtol:g} must lie in (1e-15, 1), atol = {atol} must be positive")
+    scales = np.ascontiguousarray(np.broadcast_to(np.asarray(atol, float), (n,)))
+    which = [-1] * (n if variations else 0) + [compiled.place(name) for name in parameters]
+    z = np.zeros((n, 1 + len(which)))
+    z[:, 0] = x
+    if variations:
+        z[:, 1 : n + 1] = np.eye(n)
+    period, rates = _clock(compiled, params, which)
+    steps, kept = 0, []
+    breaks = compiled.breaks(params) if compiled.forced else np.zeros(0)
+    h = 0.0
+    for start, end in pieces(compiled, t0, t1, period, breaks):
+        inside = 1e-13 * max(period, abs(end)) if len(breaks) else 0.0
+        status, s, h, count, times, coefficients = runge_kutta.integrate(
+            compiled.address, params, 1.0, 0.0, 1.0 / period, start, end, z, np.array(which, np.int64), rates, rtol,
+            scales, h, inside, max_steps - steps, int(dense),
+        )  # fmt: skip
+        steps += count
+        kept.append((times, coefficients))
+        if status != runge_kutta.DONE:
+            raise _failure(system, status, s, z[:, 0], steps)
+    matrix = z[:, 1 : n + 1].copy() if variations else None
+    by_parameter = z[:, 1 + (n if variations else 0) :].copy() if parameters else None
+    stored = None
+    if dense:
+        stored = (
+            np.concatenate([kept[0][0][:1], *(k[0][1:] for k in kept)]),
+            np.concatenate([k[1] for k in kept]),
+        )
+    return Flow(t1, z[:, 0].copy(), steps, matrix, by_parameter, stored)
+
+
+def _clock(compiled: CompiledField, params: Array, which: list[int]) -> tuple[float, Array]:
+    """Forcing period (1 for autonomous systems) and T_p / T of the parameters in `which`."""
+    if not compiled.forced:
+        return 1.0, np.zeros(len(which))
+    period = float(compiled.evaluations.period(params))
+    slope = compiled.evaluations.period_gradient(params)
+    return period, np.array([slope[k] / period if k >= 0 else 0.0 for k in which])
+
+
+def _failure(system: Any, status: int, t: float, x: Array, steps: int) -> Exception:
+    state = ", ".join(f"{name} = {value:.4g}" for name, value in zip(system.states, x))
+    if status == runge_kutta.NOT_FINITE:
+        return NonFiniteError(f"the solution of '{system.name}' leaves the finite range at t = {t:.6g}; last state {state}")
+    what = "needs too many steps" if status == runge_kutta.TOO_MANY_STEPS else "needs a step below rounding"
+    return ConvergenceError(
+        f"the integration of '{system.name}' {what} at t = {t:.6g}, {state}; loosen rtol and atol, or look for a jump "
+        "of the right-hand side that is not declared in `breaks`",
+        t=t, x=x.copy(), steps=steps,
+    )  # fmt: skip
