@@ -69,11 +69,12 @@ def command(
         system = system_from(model, chosen)
         start = time.perf_counter()
         computed = chart(system, x=x, y=y, shape=shape, about=_about(about), tolerance=tolerance)
-        seconds = time.perf_counter() - start
+        painted = time.perf_counter() - start
+        traced = len(computed.boundaries), time.perf_counter() - start - painted
     for path in outputs:
         with console.working(f"writing {path}"), replacing(path) as temporary:
             _write(computed, temporary, kind)
-    document = _document(computed, model, chosen, x, y, seconds, outputs)
+    document = _document(computed, model, chosen, x, y, painted, traced, outputs)
     _report(console, document, computed, bool(outputs))
     console.result(document)
 
@@ -109,8 +110,8 @@ def _write(computed: StabilityChart, path: Path, kind: str) -> None:
 
 
 def _document(
-    computed: StabilityChart, model: str, chosen: dict[str, Any], x: Any, y: Any, seconds: float,
-    outputs: tuple[Path, ...],
+    computed: StabilityChart, model: str, chosen: dict[str, Any], x: Any, y: Any, painted: float,
+    traced: tuple[int, float], outputs: tuple[Path, ...],
 ) -> dict[str, Any]:  # fmt: skip
     import numpy as np
 
@@ -126,8 +127,8 @@ def _document(
         "largest_growth_rate": float(np.nanmax(computed.growth_rate)),
         "error": float(np.nanmax(computed.error)),
         "tips": [{"order": tip.order, x[0]: tip.x, y[0]: tip.y} for tip in computed.tips],
-        "boundaries": len(computed.boundaries),
-        "seconds": seconds,
+        "boundaries": traced[0],
+        "seconds": {"points": painted, "boundaries": traced[1]},
         "written": [str(path) for path in outputs],
     }
 
@@ -140,7 +141,8 @@ def _report(console: Console, document: dict[str, Any], computed: StabilityChart
         console.say(sketch(computed.growth_rate, x, y, columns=min(console.width() - 12, 96)))
     nx, ny = document["shape"]
     rows = [
-        ("points", f"{nx} x {ny} in {document['seconds']:.2f} s"),
+        ("points", f"{nx} x {ny} in {document['seconds']['points']:.2f} s"),
+        ("boundaries", f"{document['boundaries']} curves in {document['seconds']['boundaries']:.2f} s"),
         ("growth rate", f"at most {document['largest_growth_rate']:.6g}, error <= {document['error']:.1e}"),
         *((word, f"{share:.2%} of the points") for word, share in document["shares"].items()),
     ]
