@@ -24,11 +24,8 @@ def command(console: Console, file: Path, force: bool) -> None:
     text = template(_model_name(file.stem))
     with replacing(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
-    console.say(f"wrote {file}: a Duffing oscillator; edit it, then")
-    console.table([
-        (f"stability models {file}", "shows the equations of motion that come out of it"),
-        (f"stability chart {file} --about linear --x Omega:0.2:2.5 --y F:0:2", "charts its linear response"),
-    ])
+    console.say(f"wrote {file}: a Duffing oscillator, each key explained; edit it, and")
+    console.table([(f"stability models {file}", "shows the equations of motion that come out of it")])
     console.result({"written": str(file)})
 
 
