@@ -16,6 +16,7 @@ import hashlib
 import importlib.util
 import inspect
 import sys
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -24,6 +25,8 @@ from typing import Any
 from ..errors import InputError, unknown_name
 from .system import System
 from .textfile import load_model
+
+_MISTAKES = (SyntaxError, ImportError, NameError, AttributeError, TypeError, LookupError, ArithmeticError)
 
 __all__ = ["load_function", "resolve_model"]
 
@@ -83,6 +86,14 @@ def load_function(path: str, name: str) -> System:
     return _system_of(found, f"{file.name}:{name}")
 
 
+def _line(error: BaseException, file: Path) -> int:
+    """The line of the file in which the error arose; 0 if none did."""
+    if isinstance(error, SyntaxError):
+        return error.lineno or 0
+    lines = [f.lineno or 0 for f in traceback.extract_tb(error.__traceback__) if f.filename == str(file)]
+    return lines[-1] if lines else 0
+
+
 def _is_system(value: Any) -> bool:
     return isinstance(value, System)
 
@@ -97,9 +108,10 @@ def _imported(file: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except (SyntaxError, ImportError, NameError) as error:
+    except _MISTAKES as error:
         del sys.modules[name]
-        raise InputError(f"{file.name} cannot be imported: {type(error).__name__}: {error}") from error
+        place = f", line {_line(error, file)}" if _line(error, file) else ""
+        raise InputError(f"{file.name}{place} cannot be run: {type(error).__name__}: {error}") from error
     return module
 
 

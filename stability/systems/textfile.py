@@ -6,7 +6,7 @@
     [parameters]  name = number, or name = { value, unit, bounds = [lo, hi], description }
     [forces]      coordinate = "Q"              [outputs]  name = "expression"         [units]  state or output = "mm"
     [orders]      parameter = power of the small parameter that it carries (averaging)
-    [base]        parameter, angular_frequency: the base motion that with_excitation prescribes
+    [base]        parameter (amplitude or acceleration), angular_frequency: the motion with_excitation prescribes
     [[stops]]     coordinate, position, side, restitution: walls
     [tables.NAME] x, y (samples), method, extrapolate: a measured function of one argument, used as NAME(...)
 
@@ -332,7 +332,11 @@ class _Reader:
             raise self.wrong("base", "needs parameter and angular_frequency")
         name = self.typed("base.parameter", section["parameter"], str)
         self.check_member("base.parameter", "parameter", name, parameters)
-        return BaseMotion(name, self.expression("base.angular_frequency", section["angular_frequency"], parameters))
+        frequency = self.expression("base.angular_frequency", section["angular_frequency"], parameters)
+        try:
+            return BaseMotion(name, frequency)
+        except InputError as error:
+            raise InputError(f"{self.where}, base: {error}") from None
 
     def stops(self) -> list[Any]:
         from .stops import HardStop
