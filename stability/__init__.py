@@ -39,6 +39,7 @@ _EXPORTS: dict[str, str] = {
     "monodromy": "floquet.period_maps",
     "Status": "words",
     "System": "systems.system",
+    "Table": "systems.tables",
     "Verdict": "words",
     "dimensionless": "systems.scaling",
     "linearised": "systems.linearising",

@@ -19,7 +19,7 @@ import ctypes
 import math
 import threading
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -139,9 +139,9 @@ class Evaluator:
         P = self._checked_parameters(P)
         period = self._period_values(P)[0]
         if P.ndim == 1:
-            period = float(period)
-            if 0.0 < period < math.inf:
-                return period
+            number = float(period)
+            if 0.0 < number < math.inf:
+                return number
         elif np.all((period > 0.0) & (period < np.inf)):
             return period
         raise InputError(f"the period must be finite and positive, got {period} at {self._named(P)}")
@@ -265,7 +265,7 @@ def _float_array(values: Any, what: str) -> Array:
 def address_of(array: Array) -> int:
     """Address of an array's first element (a quarter of the time that `array.ctypes.data` takes, where it can)."""
     try:
-        return ctypes.addressof(ctypes.c_char.from_buffer(array))
+        return ctypes.addressof(ctypes.c_char.from_buffer(cast(Any, array)))
     except (TypeError, ValueError):  # read-only or empty
         return int(array.ctypes.data)
 

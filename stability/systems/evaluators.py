@@ -117,6 +117,11 @@ def evaluator(system: Any, backend: str = "auto", *, derivatives: str = "differe
         Of Python functions only. The complex step is exact to rounding for analytic functions and silently wrong for
         |x|, comparisons and anything that drops imaginary parts.
 
+    Returns
+    -------
+    Evaluator
+        Frozen in use and safe to share between threads; keep a reference as long as one of its addresses is in use.
+
     Raises
     ------
     CompileError

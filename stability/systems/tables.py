@@ -168,7 +168,21 @@ class Table:
 
     @classmethod
     def from_samples(cls, name: str, x: Any, y: Any, *, method: str = "quintic", extrapolate: str = "linear") -> Table:
-        """Interpolate samples: ``method="quintic"`` (C^4; at least 6 samples) or ``"monotone"`` (C^1, no overshoot).
+        """Interpolate samples.
+
+        Parameters
+        ----------
+        name : str
+            Identifier, as printed in equations.
+        x, y : (N,) samples, x strictly increasing
+        method : "quintic" or "monotone"
+            Spline of degree 5 (C^4, not-a-knot ends; N >= 6), or monotone cubic (C^1, no overshoot; N >= 2).
+        extrapolate : "linear" or "nan"
+
+        Raises
+        ------
+        InputError
+            Samples not finite, not increasing, not enough, or of different length.
 
         Examples
         --------
@@ -202,10 +216,19 @@ class Table:
         extrapolate: str = "linear",
         max_pieces: int = 4096,
     ) -> Table:
-        """Tabulate a numpy function on an interval so that the error, relative to max |f|, is below `tolerance`.
+        """Tabulate a numpy function on an interval with a measured, bounded error (quintic spline, equidistant nodes).
 
-        The error is measured at four points in every piece; nodes are doubled until it is small enough. It is kept,
-        in absolute terms, as `fit_error`.
+        Parameters
+        ----------
+        name : str
+            Identifier, as printed in equations.
+        function : callable
+            Of an array, giving an array.
+        interval : (low, high)
+        tolerance : float
+            Bound of the error divided by the largest modulus of the function at the nodes.
+        extrapolate : "linear" or "nan"
+        max_pieces : int
 
         Raises
         ------
@@ -213,6 +236,10 @@ class Table:
             Bad interval or tolerance; function not finite on the interval.
         ConvergenceError
             `max_pieces` pieces do not reach the tolerance (a kink or jump inside: tabulate the two sides apart).
+
+        *Accuracy*: the error is measured at four points in every piece, and nodes are doubled until it is below the
+        tolerance; the largest, in absolute terms, is kept as `fit_error`. Derivatives of order k lose about k orders
+        of the node distance.
 
         Examples
         --------
@@ -254,6 +281,10 @@ class TableFunction(sp.Function):
         """The derivative table at the same argument."""
         return self.table.derivative()(self.args[0])
 
+    def __reduce_ex__(self, protocol: Any) -> tuple[Any, ...]:
+        """Pickled as the table and its argument: the class is made at run time."""
+        return self.table, (self.args[0],)
+
     def to_plain(self) -> dict[str, Any]:
         """The table as plain data, for the expression tree (the argument stands beside it)."""
         return self.table.to_dict()
@@ -283,7 +314,7 @@ def _function_class(table: Table) -> type[TableFunction]:
 
 @lru_cache(maxsize=128)
 def _derivative_table(table: Table) -> Table:
-    rows = table.rows[:, 1:] * np.arange(1, table.rows.shape[1])
+    rows: np.ndarray = table.rows[:, 1:] * np.arange(1, table.rows.shape[1])
     if rows.shape[1] == 0:
         rows = 0.0 * table.rows
     return Table._from_rows(f"{table.name}_prime", table.breakpoints, rows, table.extrapolate)

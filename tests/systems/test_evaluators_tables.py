@@ -1,6 +1,7 @@
 """Tables: polynomials reproduced exactly, derivative and antiderivative inverse to each other, data round trip, refusals."""
 
 import json
+import pickle
 
 import numpy as np
 import pytest
@@ -124,6 +125,13 @@ def test_equality_hash_and_round_trip():
     for table in (one, one.derivative(), one.antiderivative(), Table("g", [0, 1], [[1, 2]], extrapolate="nan")):
         assert Table.from_dict(json.loads(json.dumps(table.to_dict()))) == table
     assert one(sp.Float(0.5)).evalf() == pytest.approx(float(one.evaluate(0.5)), rel=1e-15)
+
+
+def test_applied_tables_can_be_pickled():
+    """Their classes are made at run time, so pickling goes through the table."""
+    table = Table("f", [0.0, 1.0], [[1.0, 2.0]])
+    expression = x * table(x**2) + table.derivative()(x)
+    assert pickle.loads(pickle.dumps(expression)) == expression  # noqa: S301 - own bytes
 
 
 def test_system_with_a_table_is_data():
