@@ -176,14 +176,20 @@ def trace(
         good = converged & (turn < _TURN) & (moved < 2.0 * step[active]) & (moved > 0.3 * step[active])
         finished = np.zeros(active.size, dtype=bool)
         for k, lane in enumerate(active):
+            if np.abs(trial[k]).max() > 1.0:
+                point = _onto_rim(function, p[lane], trial[k])
+                if point is not None and np.hypot(*(point - p[lane])) < 2.0 * step[lane]:
+                    paths[lane].append(point)
+                    ends[lane], finished[k] = "rim", True
+                    continue
+                good[k] = False
             if not good[k]:
                 step[lane] *= 0.4
                 if step[lane] < _STEP_SMALLEST:
                     ends[lane], finished[k] = "stopped", True
                 continue
             if np.abs(new[k]).max() > 1.0:
-                paths[lane].append(_onto_rim(function, p[lane], new[k]))
-                ends[lane], finished[k] = "rim", True
+                step[lane] *= 0.4
                 continue
             back = np.hypot(*(new[k] - starts[lane]))
             if travelled[lane] > 8.0 * step[lane] and back < 0.9 * step[lane]:
@@ -199,24 +205,25 @@ def trace(
     return [(np.array(path), end) for path, end in zip(paths, ends, strict=True)]
 
 
-def _onto_rim(function: Function, inside: Array, outside: Array) -> Array:
-    """The point of the curve on the rim between a point inside and one outside the square."""
-    fraction = 1.0
-    for axis in (0, 1):
-        if abs(outside[axis]) > 1.0:
-            fraction = min(fraction, (np.sign(outside[axis]) - inside[axis]) / (outside[axis] - inside[axis]))
-            side = axis
-    point = inside + fraction * (outside - inside)
-    side = int(np.argmax(np.abs(point))) if abs(abs(point[side]) - 1.0) > 1e-9 else side
-    point[side] = np.sign(point[side])
+def _onto_rim(function: Function, inside: Array, outside: Array) -> Array | None:
+    """The point of the curve on the rim between a point inside and one outside the square; None if there is none."""
+    beyond = np.abs(outside) > 1.0
+    gap = outside - inside
+    fractions = np.where(beyond, (np.sign(outside) - inside) / np.where(beyond, gap, 1.0), np.inf)
+    side = int(fractions.argmin())
+    point = inside + fractions[side] * gap
+    point[side] = np.sign(outside[side])
     other = 1 - side
+    point[other] = np.clip(point[other], -1.0, 1.0)
     for _ in range(20):
         g, gu, gv = function(point[:1], point[1:])
-        slope = (gu, gv)[other][0]
-        if slope == 0:
-            break
-        change = np.clip(g[0] / slope, -0.05, 0.05)
+        slope = float((gu, gv)[other][0])
+        if slope == 0.0:
+            return None
+        change = float(g[0]) / slope
+        if abs(change) > 0.05 or abs(point[other] - change) > 1.0:
+            return None
         point[other] -= change
         if abs(change) < 1e-15:
             break
-    return point
+    return point if abs(change) < 1e-11 else None
