@@ -16,12 +16,12 @@ import numpy as np
 
 from stability.kernels.addresses import call_field
 from stability.kernels.caching import kernel
-from stability.kernels.dop853_coefficients import D as _D
 from stability.kernels.dop853_coefficients import E3 as _E3
 from stability.kernels.dop853_coefficients import E5 as _E5
 from stability.kernels.dop853_coefficients import A as _A
 from stability.kernels.dop853_coefficients import B as _B
 from stability.kernels.dop853_coefficients import C as _C
+from stability.kernels.dop853_coefficients import D as _D
 
 __all__ = ["DONE", "NOT_FINITE", "STEP_TOO_SMALL", "TOO_MANY_STEPS", "integrate", "interpolate"]
 

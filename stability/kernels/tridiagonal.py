@@ -48,13 +48,13 @@ def sturm_count(diagonal: Array, squares: Array, x: Array) -> NDArray[np.int64]:
     -------
     (..., P) int
     """
-    pivot = diagonal[0] - x
-    pivot = np.where(np.abs(pivot) < _TINY, -_TINY, pivot)
-    count = (pivot < 0).astype(np.int64)
-    for k in range(1, diagonal.shape[0]):
-        pivot = (diagonal[k] - x) - squares[k - 1] / pivot
-        pivot[np.abs(pivot) < _TINY] = -_TINY
-        count += pivot < 0
+    # a pivot of exactly zero makes the next one -inf, which counts as it should (IEEE arithmetic; no -0 occurs)
+    with np.errstate(divide="ignore"):
+        pivot = diagonal[0] - x
+        count = (pivot < 0).astype(np.int64)
+        for k in range(1, diagonal.shape[0]):
+            pivot = (diagonal[k] - x) - squares[k - 1] / pivot
+            count += pivot < 0
     return count
 
 
@@ -62,30 +62,28 @@ def _newton_step(diagonal: Array, squares: Array, x: Array) -> tuple[Array, NDAr
     """Rayleigh-quotient correction at `x` (P,), and the Sturm count there."""
     size, points = diagonal.shape
     down, slope = np.empty((size, points)), np.empty((size, points))
-    down[0], slope[0] = diagonal[0] - x, 1.0
-    count = np.zeros(points, dtype=np.int64)
+    gamma, rise = np.empty((size, points)), np.empty((size, points))
+    shifted = diagonal - x
     for k in range(size):
         if k:
             ratio = squares[k - 1] / down[k - 1]
-            down[k] = (diagonal[k] - x) - ratio
+            np.subtract(shifted[k], ratio, out=down[k])
             slope[k] = 1.0 + ratio / down[k - 1] * slope[k - 1]
-        row = down[k]
-        row[np.abs(row) < _TINY] = -_TINY
-        count += row < 0
-    up, rise = diagonal[-1] - x, np.ones(points)
-    best, step = np.full(points, np.inf), np.zeros(points)
-    for k in range(size - 1, -1, -1):
-        gamma = down[k]
-        if k < size - 1:
-            ratio = squares[k] / up
-            gamma = down[k] - ratio  # = p_k + m_k - (d_k - x), without the difference of two large numbers
-            up, rise = (diagonal[k] - x) - ratio, 1.0 + ratio / up * rise
-        up = np.where(np.abs(up) < _TINY, -_TINY, up)
-        take = np.abs(gamma) < best
-        best = np.where(take, np.abs(gamma), best)
-        norm = slope[k] + rise - 1.0  # |z|^2; an overflow far from the eigenvalue must not pass for a step of zero
-        step = np.where(take, np.where(norm < np.inf, gamma / norm, np.nan), step)
-    return step, count
+        else:
+            down[0], slope[0] = shifted[0], 1.0
+        np.copyto(down[k], -_TINY, where=np.abs(down[k]) < _TINY)
+    up = shifted[-1]
+    gamma[-1], rise[-1] = down[-1], 1.0
+    for k in range(size - 2, -1, -1):
+        np.copyto(up, -_TINY, where=np.abs(up) < _TINY)
+        ratio = squares[k] / up
+        gamma[k] = down[k] - ratio  # = p_k + m_k - (d_k - x), without the difference of two large numbers
+        rise[k] = 1.0 + ratio / up * rise[k + 1]
+        up = shifted[k] - ratio
+    best = np.argmin(np.abs(gamma), axis=0)[None]
+    picked = [np.take_along_axis(array, best, axis=0)[0] for array in (gamma, slope, rise)]
+    norm = picked[1] + picked[2] - 1.0  # |z|^2; an overflow far from the eigenvalue must not pass for a step of zero
+    return np.where(norm < np.inf, picked[0] / norm, np.nan), np.sum(down < 0, axis=0)
 
 
 def _multisection(

@@ -23,31 +23,27 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError
 from ..kernels import condensation_newton as kernels
 from ..kernels.meshes import uniform_edges
-from ..protocols import Corrected, Critical, Seed, Spectrum, Tangent
-from ..results.solutions import PeriodicOrbit
-from ..words import Kind
+from ..protocols import Corrected, Spectrum, Tangent
 from .collocation_linearisation import CollocationLinearisation, Workspace
-from ..integration.compiled import CompiledField
 from .orbit_adaption import adapted
-from .orbit_measures import orbit_measures, orbit_view
 from .orbit_mesh import OrbitMesh
-from .orbit_starts import discretised, doubled_problem, started
 from .orbit_spectrum import deflated, eigenvalues, orbit_spectrum, spectrum_distance
+from .orbit_starts import doubled_problem
+from .orbits import OrbitDiscretisation, whole_number, winding_vector
 
 __all__ = ["Collocation"]
 
 Array = np.ndarray
-_CRITICAL = Critical(circle=True, pair=Kind.NEIMARK_SACKER, minus=-1.0)
 _MAX_ITERATIONS = {0: 30, 1: 8}  # without and with a tangent
 _NOTES = {kernels.NO_CONVERGENCE: "no convergence", kernels.SINGULAR: "singular"}
 _MAX_INTERVALS = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Collocation:
+class Collocation(OrbitDiscretisation):
     """Periodic orbits of a system, forced or autonomous, as a continuation problem.
 
     Parameters
@@ -101,10 +97,7 @@ class Collocation:
     def __post_init__(self) -> None:
         n = self.system.n
         for name, low, high in (("degree", 1, 11), ("intervals", 1, _MAX_INTERVALS), ("multiple", 1, 64)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or int(value) != value or not low <= value <= high:
-                raise InputError(f"{name} = {value!r}: a whole number from {low} to {high} is needed")
-            object.__setattr__(self, name, int(value))
+            object.__setattr__(self, name, whole_number(name, getattr(self, name), low, high))
         if not self.accuracy > 0:
             raise InputError(f"accuracy = {self.accuracy!r}: a positive number is needed (1e-9 is the default)")
         symmetric = self.symmetry is not None
@@ -125,25 +118,8 @@ class Collocation:
         for name, value in (("closure", matrix), ("scales", scales), ("edges", edges)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "winding", self._winding_vector())
-        own = 0 if self.flow.forced else 1
-        object.__setattr__(self, "mesh", OrbitMesh(edges, self.degree, n, self.span, own))
-
-    def _winding_vector(self) -> Array:
-        states, given = self.system.states, self.winding
-        if given is None:
-            return np.zeros(len(states))
-        if isinstance(given, Mapping):
-            out = np.zeros(len(states))
-            for name, turns in given.items():
-                if name not in self.system.angles:
-                    raise unknown_name("angle", name, self.system.angles, "the system")
-                out[states.index(name)] = 2 * np.pi * float(turns)
-            return out
-        out = np.array(given, float)
-        if out.shape != (len(states),):
-            raise InputError(f"winding must be a mapping angle -> turns or {len(states)} numbers, got {given!r}")
-        return out
+        object.__setattr__(self, "winding", winding_vector(self.system, self.winding))
+        object.__setattr__(self, "mesh", OrbitMesh(edges, self.degree, n, self.span, self.own))
 
     def break_points(self, params: Array) -> Array:
         """Breaks of the forcing at `params` as points s of the orbit, ascending, in [0, 1)."""
@@ -161,16 +137,6 @@ class Collocation:
     span: float = field(init=False, repr=False)
     closure: Array = field(init=False, repr=False)
 
-    @cached_property
-    def flow(self) -> CompiledField:
-        """The compiled field of the system and its forcing period."""
-        return CompiledField.of(self.system)
-
-    @property
-    def evaluations(self) -> Any:
-        """The evaluator of the system."""
-        return self.flow.evaluations
-
     @property
     def kept(self) -> Array:
         """State indices that enter the factorisation (see kernels/condensation.py)."""
@@ -182,18 +148,35 @@ class Collocation:
         return self.flow.position
 
     @property
-    def parameters(self) -> Mapping[str, float]:
-        """Those of the system."""
-        return self.system.parameters
+    def size(self) -> int:
+        """Length of u."""
+        return self.mesh.size
 
-    @property
-    def critical(self) -> Critical:
-        """Multipliers leave at +1, -1 or as a pair."""
-        return _CRITICAL
+    @cached_property
+    def places(self) -> Array:
+        """Points s (K,) whose states make u: mesh points, then stages."""
+        return np.concatenate([self.mesh.edges, self.mesh.points.ravel()])
 
-    def index(self, name: str) -> int:
-        """Place of a parameter in p."""
-        return self.flow.place(name)
+    def packed(self, values: Array, period: float) -> Array:
+        """u from states (K, n) at `places`."""
+        count = self.mesh.intervals + 1
+        return self.mesh.join(values[:count], values[count:], period)
+
+    def pieces(self, u: Array, params: Array) -> tuple[int, Array, Array, float]:
+        """(degree d, edges (K + 1,) in [0, 1], values (K, d + 1, n) at (0, Gauss points), period) of the whole orbit.
+
+        The Newton step at degree m + 1 that estimates the error has a better polynomial than u: that one is given.
+        """
+        refined, mesh = self.refined(u, params), self.mesh
+        if refined is not None:
+            mesh, u = mesh.raised[0], refined[1]
+        nodes, stages, rest = mesh.split(u)
+        values, edges = mesh.polynomial(nodes, stages), mesh.edges
+        if self.halved:
+            values = np.concatenate([values, values @ self.closure.T + self.winding])
+            edges = np.concatenate([edges / 2, 0.5 + edges[1:] / 2])
+        period = float(rest[0]) if mesh.own else self.orbit_period(params)
+        return mesh.degree, edges, values, period
 
     @cached_property
     def quadrature(self) -> Array:
@@ -313,36 +296,16 @@ class Collocation:
             work.M[:], work.Z[:] = np.nan, np.nan
         return CollocationLinearisation(self, u, params, work, sign)
 
-    # ------------------------------------------------------------------ starts, meshes, results
-    def start(self, params: Array, guess: Any = None) -> Array:
-        """A converged u from a guess (see `orbit_starts`), or an error that says which guess to give."""
-        return started(self, np.asarray(params, float), guess)
-
-    def seed(self) -> Seed | None:
-        """None: not born at a special point."""
-        return None
-
+    # ------------------------------------------------------------------ meshes and doubled orbits
     def adapt(
         self, u: Array, params: Array, tangent: Tangent | None
     ) -> tuple[Collocation, Array, Tangent | None] | None:
         """A better mesh or better scales (see `orbit_adaption`), or None."""
         return adapted(self, u, params, tangent) if self.adaptive else None
 
-    def measures(self, u: Array, params: Array) -> dict[str, float]:
-        """Columns of a branch (see `orbit_measures`)."""
-        return orbit_measures(self, u, params)
-
-    def view(self, u: Array, params: Array) -> PeriodicOrbit:
-        """The orbit as a user sees it."""
-        return orbit_view(self, u, np.asarray(params, float))
-
     def doubled(self, u: Array, params: Array, vector: Array) -> tuple[Collocation, Array, Array]:
         """The problem of twice the period, the orbit run through twice, and the direction (v(s), -v(s))."""
         return doubled_problem(self, u, params, vector)
-
-    def discretise(self, times: Array, states: Array, period: float) -> Array:
-        """u of a periodic function from equispaced samples states (n, K)."""
-        return discretised(self, times, states, period)
 
     # ------------------------------------------------------------------ spectrum and error
     def refined(self, u: Array, params: Array) -> tuple[Array, Array, Workspace] | None:

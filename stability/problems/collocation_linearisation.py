@@ -37,7 +37,7 @@ Array = np.ndarray
 class Workspace:
     """The arrays a kernel fills at one linearisation: field and derivatives at the stages, factors, node relations."""
 
-    __slots__ = ("LU", "F", "Fp", "J", "M", "T", "Z", "dT", "pivots")
+    __slots__ = ("F", "Fp", "J", "LU", "M", "T", "Z", "dT", "pivots")
 
     def __init__(self, mesh: OrbitMesh, m: int, kept: int) -> None:
         count, N, n = mesh.intervals * mesh.degree, mesh.intervals, mesh.n
@@ -99,6 +99,12 @@ class CollocationLinearisation:
         node[:-1] = nodes[1:] - (1 - d.sum()) * nodes[:-1] - np.einsum("i,jin->jn", d, inner)
         node[-1] = nodes[-1] - self.problem.closure @ nodes[0] - self.problem.winding
         return mesh.join(node, stage, 0.0)
+
+    @property
+    def size_of_residual(self) -> float:
+        """Largest residual over the scales of the states."""
+        mesh = self.mesh
+        return float(np.abs(self.residual[: mesh.size - mesh.own].reshape(-1, mesh.n) / self.problem.scales).max())
 
     def _stage_column(self, free: int) -> Array:
         """(N, mn): derivative of the stage equations by parameter `free`, -1: by the period."""

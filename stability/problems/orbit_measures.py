@@ -1,7 +1,6 @@
 """What is recorded of an orbit at every point of a branch, and the orbit a user sees.
 
-The unknowns hold the polynomial of degree m; the Newton step at degree m + 1 that estimates the error has a better one,
-and that is the one measured and shown. Extrema are those of the polynomial; <x>.amplitude(1) = 2 |c_1| is the first
+Every discretisation gives its orbit as polynomials on pieces of the period (`pieces`). Extrema are those of the polynomial; <x>.amplitude(1) = 2 |c_1| is the first
 harmonic of the orbit's own period, c_1 = int_0^1 x(s) exp(-2 pi i s) ds by Gauss quadrature. An orbit solved on half
 of its period is unfolded by its symmetry first: x(s + 1/2) = S x(s).
 """
@@ -18,9 +17,9 @@ from ..kernels.gauss import gauss_rule
 from ..results.solutions import PeriodicOrbit
 
 if TYPE_CHECKING:
-    from .collocation import Collocation
+    from .orbits import OrbitDiscretisation
 
-__all__ = ["orbit_measures", "orbit_view", "pieces"]
+__all__ = ["orbit_measures", "orbit_view"]
 
 Array = np.ndarray
 
@@ -32,24 +31,9 @@ def _to_monomials(degree: int) -> Array:
     return np.asarray(np.linalg.inv(np.vander(abscissae, increasing=True)))
 
 
-def pieces(problem: Collocation, u: Array, params: Array) -> tuple[int, Array, Array, float]:
-    """(degree, edges (K + 1,) in s, values (K, d + 1, n) at the local abscissae, period) of the whole orbit."""
-    mesh = problem.mesh
-    refined = problem.refined(u, params)
-    if refined is not None:
-        mesh, u = mesh.raised[0], refined[1]
-    nodes, stages, rest = mesh.split(u)
-    values, edges = mesh.polynomial(nodes, stages), mesh.edges
-    if problem.halved:
-        values = np.concatenate([values, values @ problem.closure.T + problem.winding])
-        edges = np.concatenate([edges / 2, 0.5 + edges[1:] / 2])
-    period = float(rest[0]) if mesh.own else problem.multiple * problem.evaluations.period(params)
-    return mesh.degree, edges, values, period
-
-
-def orbit_measures(problem: Collocation, u: Array, params: Array) -> dict[str, float]:
+def orbit_measures(problem: OrbitDiscretisation, u: Array, params: Array) -> dict[str, float]:
     """Columns: <state>.max, <state>.min, <coordinate>.amplitude(1), <output>.max, .min, .mean, period."""
-    degree, edges, values, period = pieces(problem, u, params)
+    degree, edges, values, period = problem.pieces(u, params)
     rule, states = gauss_rule(degree), problem.system.states
     C = np.ascontiguousarray(np.einsum("ki,jin->jkn", _to_monomials(degree), values))
     low, high = np.empty(len(states)), np.empty(len(states))
@@ -77,22 +61,21 @@ def orbit_measures(problem: Collocation, u: Array, params: Array) -> dict[str, f
     return out
 
 
-def orbit_view(problem: Collocation, u: Array, params: Array) -> PeriodicOrbit:
+def orbit_view(problem: OrbitDiscretisation, u: Array, params: Array) -> PeriodicOrbit:
     """The orbit with its multipliers (the trivial one included), verdict, error and residual."""
-    degree, edges, values, period = pieces(problem, u, params)
+    degree, edges, values, period = problem.pieces(u, params)
     linearisation = problem.linearise(u, params)
     spectrum = problem.spectrum(linearisation)
     multipliers = spectrum.values
     if problem.halved:
         multipliers = multipliers**2
-    if problem.mesh.own:
+    if problem.own:
         multipliers = np.append(multipliers, 1.0)
     multipliers = multipliers[np.argsort(-np.abs(multipliers), kind="stable")]
-    residual = linearisation.residual[: problem.mesh.size - problem.mesh.own].reshape(-1, problem.mesh.n)
     return PeriodicOrbit.from_nodes(
         problem.system.states, edges * period, gauss_rule(degree).abscissae, values,
         dict(zip(problem.parameters, params.tolist())), multipliers=multipliers, verdict=spectrum.verdict,
-        error=problem.error(u, params), residual=float(np.abs(residual / problem.scales).max()),
+        error=problem.error(u, params), residual=linearisation.size_of_residual,
         winding=problem.winding * (2 if problem.halved else 1),
     )  # fmt: skip
 

@@ -19,6 +19,7 @@ from ..protocols import Corrected
 
 if TYPE_CHECKING:
     from .collocation import Collocation
+    from .orbits import OrbitDiscretisation
 
 __all__ = ["discretised", "doubled_problem", "from_function", "started"]
 
@@ -27,16 +28,13 @@ _TOLERANCE = 1e-10
 _TRANSIENTS = 400  # periods of a forced system
 
 
-def from_function(problem: Collocation, function: Callable[[Array], Array], period: float) -> Array:
+def from_function(problem: OrbitDiscretisation, function: Callable[[Array], Array], period: float) -> Array:
     """u of x = function(t) -> (n, K) with the given orbit period."""
-    mesh = problem.mesh
     length = period * (0.5 if problem.halved else 1.0)
-    s = np.concatenate([mesh.edges, mesh.points.ravel()])
-    values = np.asarray(function(s * length), float).T
-    return mesh.join(values[: mesh.intervals + 1], values[mesh.intervals + 1 :], period)
+    return problem.packed(np.asarray(function(problem.places * length), float).T, period)
 
 
-def discretised(problem: Collocation, times: Array, states: Array, period: float) -> Array:
+def discretised(problem: OrbitDiscretisation, times: Array, states: Array, period: float) -> Array:
     """u of the trigonometric interpolant of equispaced samples states (n, K)."""
     states = np.asarray(states, float)
     count = states.shape[1]
@@ -55,9 +53,7 @@ def discretised(problem: Collocation, times: Array, states: Array, period: float
     return from_function(problem, function, period)
 
 
-def doubled_problem(
-    problem: Collocation, u: Array, params: Array, vector: Array
-) -> tuple[Collocation, Array, Array]:
+def doubled_problem(problem: Collocation, u: Array, params: Array, vector: Array) -> tuple[Collocation, Array, Array]:
     """Twice the period: the mesh twice, the orbit twice, and the variation (v(s), -v(s)) of M v = -v."""
     mesh = problem.mesh
     edges = np.concatenate([mesh.edges / 2, 0.5 + mesh.edges[1:] / 2])
@@ -81,20 +77,19 @@ def doubled_problem(
 
 
 # ---------------------------------------------------------------------- start
-def started(problem: Collocation, params: Array, guess: Any) -> Array:
+def started(problem: OrbitDiscretisation, params: Array, guess: Any) -> Array:
     """A converged u; see the head of this file.
 
     guess: None, a state (mapping of names or array (n,)), an array u, an orbit (callable with `period`), a fixed point
     (with `x`), or a function t -> (n, K) together with its period as the tuple (function, period).
     """
-    mesh = problem.mesh
-    if isinstance(guess, np.ndarray) and guess.shape == (mesh.size,):
+    if isinstance(guess, np.ndarray) and guess.shape == (problem.size,):
         return _settled(problem, np.array(guess, float), params, "the given solution")
     if isinstance(guess, tuple) and len(guess) == 2 and callable(guess[0]):
         return _settled(problem, from_function(problem, guess[0], float(guess[1])), params, "the given function")
     if callable(guess) and hasattr(guess, "period"):
         return _from_orbit(problem, params, guess)
-    if guess is None and not mesh.own:
+    if guess is None and not problem.own:
         return _from_rest(problem, params)
     if guess is None:
         raise InputError(
@@ -105,54 +100,51 @@ def started(problem: Collocation, params: Array, guess: Any) -> Array:
     return _from_transients(problem, params, problem.system.state_vector(state))
 
 
-def _newton(problem: Collocation, u: Array, params: Array) -> Corrected:
+def _newton(problem: OrbitDiscretisation, u: Array, params: Array) -> Corrected:
     name = next(iter(problem.parameters), "")
     return problem.correct(u, params, name, None, 0.0, _TOLERANCE)
 
 
-def _settled(problem: Collocation, u: Array, params: Array, what: str) -> Array:
+def _settled(problem: OrbitDiscretisation, u: Array, params: Array, what: str) -> Array:
     found = _newton(problem, u, params)
     if not found.converged:
         raise _failed(problem, params, found, what)
     return found.u
 
 
-def _failed(problem: Collocation, params: Array, found: Corrected, what: str) -> ConvergenceError:
+def _failed(problem: OrbitDiscretisation, params: Array, found: Corrected, what: str) -> ConvergenceError:
     where = ", ".join(f"{k} = {v:g}" for k, v in zip(problem.parameters, params))
     return ConvergenceError(
-        f"Newton's method did not reach a periodic orbit of '{problem.system.name}' from {what} ({found.note}; residual "
-        f"{found.residual:.1e}) at {where}; give a state on or near the orbit, an orbit of another method, or start at "
+        f"Newton's method did not reach a periodic orbit of '{problem.system.name}' from {what} ({found.note}; "
+        f"residual {found.residual:.1e}) at {where}; give a state on or near the orbit, an orbit of another method, or start at "
         "another parameter value",
         residual=found.residual, iterations=found.iterations, u=found.u, params=params,
     )  # fmt: skip
 
 
-def _from_orbit(problem: Collocation, params: Array, orbit: Any) -> Array:
+def _from_orbit(problem: OrbitDiscretisation, params: Array, orbit: Any) -> Array:
     states = getattr(orbit, "states", problem.system.states)
     if tuple(states) != tuple(problem.system.states):
         raise InputError(f"the orbit has the states {tuple(states)}, the system {tuple(problem.system.states)}")
     period = float(orbit.period)
-    if not problem.mesh.own:
+    if not problem.own:
         wanted = problem.multiple * problem.evaluations.period(params)
         turns = wanted / (period * round(max(1.0, wanted / period)))
         if not 0.5 < turns < 2:
-            raise InputError(f"the orbit's period {period:g} does not fit {problem.multiple} forcing periods, {wanted:g}")
+            raise InputError(f"an orbit of period {period:g} does not fit {problem.multiple} forcing periods, {wanted:g}")
         ratio = period / wanted * max(1, round(wanted / period))
         return _settled(problem, from_function(problem, lambda t: orbit(t * ratio), wanted), params, "the given orbit")
     return _settled(problem, from_function(problem, orbit, period), params, "the given orbit")
 
 
-def _from_rest(problem: Collocation, params: Array) -> Array:
-    mesh = problem.mesh
-    wind = np.concatenate([mesh.edges, mesh.points.ravel()])[:, None] * problem.winding
-    u = mesh.join(wind[: mesh.intervals + 1], wind[mesh.intervals + 1 :], 0.0)
-    found = _newton(problem, u, params)
+def _from_rest(problem: OrbitDiscretisation, params: Array) -> Array:
+    found = _newton(problem, problem.packed(problem.places[:, None] * problem.winding, 0.0), params)
     if found.converged:
         return found.u
-    return _from_transients(problem, params, np.zeros(mesh.n))
+    return _from_transients(problem, params, np.zeros(problem.system.n))
 
 
-def _from_transients(problem: Collocation, params: Array, state: Array) -> Array:
+def _from_transients(problem: OrbitDiscretisation, params: Array, state: Array) -> Array:
     from ..integration.transients import settled_orbit
 
     times, states, period = settled_orbit(problem.system, params, state, problem.multiple, problem.winding, _TRANSIENTS)

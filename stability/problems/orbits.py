@@ -1,0 +1,132 @@
+"""What all discretisations of periodic orbits share: the system, the period, winding angles, starts, measures, views.
+
+An orbit covers `multiple` forcing periods of a forced system, or one period of its own of an autonomous one (then the
+period is an unknown, `own` = 1); x(end) = x(0) + winding for angles that turn. A subclass keeps its unknowns as it
+likes; it gives `places` (the points of scaled time whose states make u), `packed`, and `pieces` (the orbit as
+polynomials), and the linear algebra of the Problem protocol.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, unknown_name
+from ..integration.compiled import CompiledField
+from ..protocols import Critical, Seed
+from ..results.solutions import PeriodicOrbit
+from ..words import Kind
+from .orbit_measures import orbit_measures, orbit_view
+from .orbit_starts import discretised, started
+
+__all__ = ["OrbitDiscretisation", "whole_number", "winding_vector"]
+
+Array = np.ndarray
+_CRITICAL = Critical(circle=True, pair=Kind.NEIMARK_SACKER, minus=-1.0)
+
+
+def whole_number(name: str, value: Any, low: int, high: int) -> int:
+    """`value` as an int between low and high, or InputError."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or int(value) != value:
+        raise InputError(f"{name} = {value!r}: a whole number from {low} to {high} is needed")
+    if not low <= value <= high:
+        raise InputError(f"{name} = {value!r}: a whole number from {low} to {high} is needed")
+    return int(value)
+
+
+def winding_vector(system: Any, given: Any) -> Array:
+    """(n,) in radians, from turns by angle, or from an array; zero for None."""
+    states = system.states
+    out = np.zeros(len(states))
+    if isinstance(given, Mapping):
+        for name, turns in given.items():
+            if name not in system.angles:
+                raise unknown_name("angle", name, system.angles)
+            out[states.index(name)] = 2 * np.pi * float(turns)
+    elif given is not None:
+        out = np.array(given, float)
+        if out.shape != (len(states),) or not np.isfinite(out).all():
+            raise InputError(f"winding must be a mapping angle -> turns or {len(states)} numbers, got {given!r}")
+    return out
+
+
+class OrbitDiscretisation:
+    """Base of `Collocation` and `Shooting`."""
+
+    system: Any
+    multiple: int
+    winding: Any
+    halved = False
+
+    @cached_property
+    def flow(self) -> CompiledField:
+        """The compiled field of the system and its forcing period."""
+        return CompiledField.of(self.system)
+
+    @property
+    def evaluations(self) -> Any:
+        """The evaluator of the system."""
+        return self.flow.evaluations
+
+    @property
+    def own(self) -> int:
+        """1 where the period is an unknown."""
+        return 0 if self.flow.forced else 1
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Those of the system."""
+        return self.system.parameters  # type: ignore[no-any-return]
+
+    @property
+    def critical(self) -> Critical:
+        """Multipliers leave at +1, -1 or as a pair."""
+        return _CRITICAL
+
+    def index(self, name: str) -> int:
+        """Place of a parameter in p."""
+        return self.flow.place(name)
+
+    def orbit_period(self, params: Array) -> float:
+        """Period of a forced system's orbits."""
+        return float(self.multiple * self.evaluations.period(params))
+
+    # ------------------------------------------------------------------ given by subclasses
+    size: int
+
+    @property
+    def places(self) -> Array:
+        """Points s (K,) in [0, 1] whose states make u."""
+        raise NotImplementedError
+
+    def packed(self, values: Array, period: float) -> Array:
+        """u from states (K, n) at `places`."""
+        raise NotImplementedError
+
+    def pieces(self, u: Array, params: Array) -> tuple[int, Array, Array, float]:
+        """(degree d, edges (K + 1,) in [0, 1], values (K, d + 1, n) at (0, Gauss points), period) of the whole orbit."""
+        raise NotImplementedError
+
+    # ------------------------------------------------------------------ starts and results
+    def start(self, params: Array, guess: Any = None) -> Array:
+        """A converged u from a guess (see `orbit_starts`), or an error that says which guess to give."""
+        return started(self, np.asarray(params, float), guess)
+
+    def seed(self) -> Seed | None:
+        """None: not born at a special point."""
+        return None
+
+    def discretise(self, times: Array, states: Array, period: float) -> Array:
+        """u of a periodic function from equispaced samples states (n, K)."""
+        return discretised(self, times, states, period)
+
+    def measures(self, u: Array, params: Array) -> dict[str, float]:
+        """Columns of a branch (see `orbit_measures`)."""
+        return orbit_measures(self, u, np.asarray(params, float))
+
+    def view(self, u: Array, params: Array) -> PeriodicOrbit:
+        """The orbit as a user sees it."""
+        return orbit_view(self, u, np.asarray(params, float))
