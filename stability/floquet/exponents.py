@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..errors import ConvergenceError, InputError
 from ..kernels.mathieu_factors import Factors, half_period_factors, rows_for
 from ..kernels.tridiagonal import indexed_eigenvalues
-from .mathieu import MAX_Q, check_numbers, mathieu_a, rows_needed
+from .mathieu import MAX_Q, NO_COUPLING, check_numbers, mathieu_a, rows_needed
 
 __all__ = ["mathieu_a_of_exponent", "mathieu_exponent"]
 
@@ -82,7 +82,8 @@ def mathieu_exponent(a: ArrayLike, q: ArrayLike) -> Any:
     second = check_numbers("q", q, MAX_Q)
     kind = np.result_type(first, second)
     first, second = np.broadcast_arrays(first.astype(kind), second.astype(kind))
-    flat_a, flat_q = first.ravel(), second.ravel()
+    # numbers whose square is none any more are zero as far as nu is concerned
+    flat_a, flat_q = (np.where(np.abs(x) < NO_COUPLING, 0.0, x) for x in (first.ravel(), second.ravel()))
     result = np.empty(flat_a.size, dtype=complex)
     rows = rows_for(flat_a, flat_q)
     compute = _principal if kind.kind == "c" else _unfolded
@@ -232,14 +233,14 @@ def mathieu_a_of_exponent(nu: ArrayLike, q: ArrayLike) -> Any:
 
 def _from_real(nu: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:
     """Counted eigenvalues of the two-sided matrix, in blocks of like size."""
-    result = np.empty(nu.size)
+    result = nu * nu
     index = np.floor(nu).astype(np.int64)
     square = nu * nu
     rows = rows_needed(square + 2.0 * q, q)
     sizes = np.ceil(12.0 * 1.25 ** np.ceil(np.log(rows / 12.0) / np.log(1.25))).astype(np.int64)
     for size in np.unique(sizes):
-        members = np.flatnonzero(sizes == size)
-        step = max(1, 400_000 // int(2 * size + 1))
+        members = np.flatnonzero((sizes == size) & (q >= NO_COUPLING))
+        step = max(1, 100_000 // int(2 * size + 1))
         for start in range(0, members.size, step):
             block = members[start : start + step]
             fraction = nu[block] - 2.0 * np.round(0.5 * nu[block])
@@ -251,7 +252,7 @@ def _from_real(nu: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.fl
             upper = (index[block] + 1.0) ** 2 + 2.0 * q[block] + margin
             scale = np.maximum(np.maximum(q[block], square[block]), 1e-280)
             result[block] = indexed_eigenvalues((fraction + k) ** 2, squares, index[block], lower, upper, scale)
-    return np.where(q == 0.0, square, result)
+    return result
 
 
 def _below_first_edge(growth: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -33,7 +33,8 @@ __all__ = ["MAX_ORDER", "MAX_Q", "mathieu_a", "mathieu_b"]
 
 MAX_ORDER = 499
 MAX_Q = 1e6
-_BLOCK = 400_000  # numbers in one block of tridiagonal matrices (rows times points)
+NO_COUPLING = 1e-140
+_BLOCK = 100_000  # numbers in one block of tridiagonal matrices (rows times points)
 
 
 def mathieu_a(n: ArrayLike, q: ArrayLike) -> Any:
@@ -139,11 +140,11 @@ def _characteristic_values(n: ArrayLike, q: ArrayLike, odd: bool) -> Any:
     if coupling.dtype.kind == "c":
         from .complex_mathieu import continued_values  # the rarer, slower road
 
-        values = continued_values(order, coupling, odd)
+        values: NDArray[Any] = continued_values(order, coupling, odd)
     else:
         order, coupling = np.broadcast_arrays(order, coupling)
         values = real_values(order.ravel(), coupling.ravel(), odd).reshape(order.shape)
-    return values if values.ndim else values[()].item()
+    return values if values.ndim else values.item()
 
 
 def rows_needed(highest: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -169,13 +170,14 @@ def real_values(order: NDArray[np.int64], q: NDArray[np.float64], odd: bool) -> 
     """a_n(q) or b_n(q) for flat arrays, in blocks of matrices of like size."""
     lower, upper = bracket(order, q)
     rows = rows_needed(upper, q)
-    result = np.empty(order.size)
+    result = order.astype(float) ** 2
     turn = np.argsort(rows, kind="stable")
+    turn = turn[np.abs(q[turn]) >= NO_COUPLING]  # below, q changes nothing and its square is no longer a number
     start = 0
-    while start < order.size:
+    while start < turn.size:
         size = int(rows[turn[start]])
         stop = start + 1
-        while stop < order.size and rows[turn[stop]] <= 1.25 * size + 4 and (stop - start) * size < _BLOCK:
+        while stop < turn.size and rows[turn[stop]] <= 1.25 * size + 4 and (stop - start) * size < _BLOCK:
             stop += 1
         block = turn[start:stop]
         n, strength = order[block], q[block]
@@ -183,7 +185,7 @@ def real_values(order: NDArray[np.int64], q: NDArray[np.float64], odd: bool) -> 
         scale = np.maximum(np.maximum(np.abs(strength), n.astype(float) ** 2), 1e-280)
         result[block] = indexed_eigenvalues(diagonal, squares, index, lower[block], upper[block], scale)
         start = stop
-    return np.where(q == 0.0, order.astype(float) ** 2, result)
+    return result
 
 
 def family(

@@ -35,7 +35,7 @@ __all__ = ["Monodromy", "monodromy"]
 
 Array = NDArray[np.float64]
 _FIRST_STEPS, _MAX_STEPS = 16, 32768
-_PROBES = (np.arange(16) + 0.37) / 16.0
+_PROBES: NDArray[np.float64] = (np.arange(16) + 0.37) / 16.0
 _LIMIT = 1e150  # entries of M beyond this: no multipliers, but a typed error
 
 
@@ -142,10 +142,13 @@ def monodromy(system: System, about: Any = None, *, tolerance: float = 1e-13, **
     log_determinant, defect = _liouville(generator, breaks, factors)
     multipliers, errors = multipliers_with_errors(matrix, factors, log_determinant, matrix_error)
     index = int(np.argmin(np.abs(multipliers - 1.0))) if trivial else None
+    if index is not None:
+        # the trivial multiplier shows how far the orbit itself is from being one
+        errors = np.maximum(errors, abs(multipliers[index] - 1.0) * np.minimum(1.0, np.abs(multipliers)))
     judged = np.arange(len(multipliers)) if index is None else np.delete(np.arange(len(multipliers)), index)
     verdict, kind, counts = classify(multipliers[judged], errors[judged], neutral=_reciprocal(generator))
     with np.errstate(divide="ignore"):
-        exponents = np.log(multipliers) / period
+        exponents = np.asarray(np.log(multipliers) / period, dtype=complex)
     return Monodromy(
         matrix=matrix,
         multipliers=multipliers,

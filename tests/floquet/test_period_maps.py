@@ -174,6 +174,51 @@ def test_limit_cycle_of_the_normal_form() -> None:
         monodromy(system)
 
 
+def test_conservative_orbit_has_a_double_multiplier() -> None:
+    """x'' + x + x^3 = 0, x = A cn(w t, m): exact orbit; both multipliers are 1 in a Jordan block; neutral."""
+    special = pytest.importorskip("scipy.special")
+    x = sp.Function("x")(t)
+    system = st.System.from_equations({x.diff(t, 2): -x - x**3}, coordinates=[x])
+    amplitude = 1.3
+    w = np.sqrt(1 + amplitude**2)
+    m = amplitude**2 / (2 * w**2)
+
+    def orbit(time):
+        sn, cn, dn, _ = special.ellipj(w * time, m)
+        return np.array([amplitude * cn, -amplitude * w * sn * dn])
+
+    period = 4 * special.ellipk(m) / w
+    result = monodromy(system, about=Motion(orbit, period))
+    assert result.verdict is Verdict.NEUTRAL and result.trivial is not None
+    assert np.all(np.abs(result.multipliers - 1) <= result.multiplier_errors) and result.error < 1e-5
+    # M maps x' to itself; the period falls with the amplitude, so the block is not diagonal
+    rate = np.array([0.0, -amplitude - amplitude**3])
+    assert np.allclose(result.matrix @ rate, rate, atol=1e-10) and abs(result.matrix[1, 0]) > 1
+
+
+def test_orbit_of_integrated_van_der_pol() -> None:
+    """An orbit by numerical integration: trivial multiplier 1, the other inside; Liouville."""
+    integrate = pytest.importorskip("scipy.integrate")
+    system = st.models.van_der_pol()
+
+    def flow(span, start, **options):
+        return integrate.solve_ivp(system, span, start, rtol=1e-12, atol=1e-13, method="DOP853", **options)
+
+    settled = flow((0, 80), [2.0, 0.0]).y[:, -1]
+
+    def top(time, state):
+        return state[1]
+
+    top.direction = -1
+    crossing = flow((0, 40), settled, events=top)
+    times = crossing.t_events[0]
+    start, period = crossing.y_events[0][-2], times[-1] - times[-2]
+    path = flow((0, period), start, dense_output=True).sol
+    result = monodromy(system, about=Motion(lambda time: path(np.mod(time, period)), period), tolerance=1e-9)
+    assert abs(result.multipliers[0] - 1) < 1e-6 and result.trivial == 0 and result.verdict is Verdict.STABLE
+    assert result.liouville_defect < 1e-6
+
+
 def test_pendulum_upright_and_hanging() -> None:
     """About an equilibrium: Kapitza's pendulum upright is the hanging one with the sign of a and b turned."""
     system = st.models.base_driven_pendulum(epsilon=0.1, Omega=20.0)
