@@ -13,6 +13,7 @@ from stability.kernels.block_magnets import block_interaction
 from stability.kernels.coaxial_cylinders import cylinder_faces
 from stability.kernels.coaxial_discs import charged_discs
 from stability.models._magnets import MU0
+from stability.systems.evaluators import evaluator
 
 models = st.models
 mm = 1e-3
@@ -231,12 +232,22 @@ def test_table_is_the_spring_within_its_stated_error(name):
         assert math.isclose(spring.work(np.linspace(0.0, value, 5)), expected, rel_tol=1e-10)
 
 
-def test_magnet_spring_in_a_system():
-    spring = SPRINGS["levitated"]
+@pytest.mark.parametrize("backend", ["llvm", "lambdify"])
+@pytest.mark.parametrize("name", SPRINGS)
+def test_magnet_spring_in_a_system(name, backend):
+    """Equation of motion from the energy, compiled: force and slope of the geometry within the fit error of the table."""
+    spring, m = SPRINGS[name], 0.02
     t = sp.Symbol("t", real=True)
     y = sp.Function("y")(t)
-    system = st.System.from_equations({y.diff(t, 2): -spring.expression(y) / 0.02}, coordinates=[y], parameters={})
-    assert float(system(0.0, [4 * mm, 0.0])[1]) == pytest.approx(-float(spring.force(4 * mm)) / 0.02, rel=1e-9)
+    energy = m * y.diff(t) ** 2 / 2 - spring.energy_expression(y)
+    system = st.System.from_lagrangian(energy, coordinates=[y], parameters={})
+    low, high = spring._default_travel
+    at = np.linspace(0.95 * low, 0.95 * high, 61)
+    values, slopes = evaluator(system, backend).FJ(np.zeros(61), np.column_stack([at, 0.0 * at]), np.zeros(0))
+    scale = float(np.max(np.abs(spring.force(at))))
+    assert np.max(np.abs(m * values[:, 1] + spring.force(at))) <= spring.fit_error + 1e-13 * scale
+    stiffness = spring.stiffness(at)
+    assert np.max(np.abs(m * slopes[:, 1, 0] + stiffness)) < 1e-7 * np.max(np.abs(stiffness))
 
 
 def test_unequal_gaps_give_an_unsymmetric_spring():

@@ -11,6 +11,7 @@ from hypothesis import strategies as some
 
 import stability as st
 from stability.errors import InputError, UnknownNameError
+from stability.systems.evaluators import evaluator
 
 models = st.models
 q = sp.Symbol("q", real=True)
@@ -82,15 +83,21 @@ def test_expressions_are_force_and_energy(spring):
         assert math.isclose(float(slope), float(spring.force(value)), rel_tol=1e-12, abs_tol=1e-14)
 
 
-@pytest.mark.parametrize("name", ["hardening", "fractional", "play", "unilateral", "quintic table", "sum", "dipole", "rotor"])
-def test_spring_in_a_system(name):
-    """q'' = -F(q) as a System: its right-hand side is the method's force."""
-    spring = SPRINGS[name]
+@pytest.mark.parametrize("backend", ["llvm", "lambdify"])
+def test_spring_in_a_system(spring, backend):
+    """q'' = -F(q) as a System, from the force and from the energy: compiled force and slope are the methods'."""
     t = sp.Symbol("t", real=True)
     x = sp.Function("x")(t)
-    system = st.System.from_equations({x.diff(t, 2): -spring.expression(x)}, coordinates=[x], parameters={})
-    for value in (-1.713, 0.217, 1.618):
-        assert math.isclose(float(system(0.0, [value, 0.3])[1]), -float(spring.force(value)), rel_tol=1e-13)
+    newton = st.System.from_equations({x.diff(t, 2): -spring.expression(x)}, coordinates=[x], parameters={})
+    lagrange = st.System.from_lagrangian(x.diff(t) ** 2 / 2 - spring.energy_expression(x), coordinates=[x], parameters={})
+    at = np.linspace(-1.931, 1.877, 37)
+    states = np.column_stack([at, 0.3 + 0.0 * at])
+    for system in (newton, lagrange):
+        values, slopes = evaluator(system, backend).FJ(np.zeros(len(at)), states, np.zeros(0))
+        np.testing.assert_allclose(values[:, 1], -spring.force(at), rtol=1e-12, atol=1e-13)
+        np.testing.assert_allclose(slopes[:, 1, 0], -spring.stiffness(at), rtol=1e-12, atol=1e-12)
+    again = st.System.from_dict(newton.to_dict())
+    assert again == newton and np.all(again(0.0, states.T) == newton(0.0, states.T))
 
 
 # ---- expressions with symbols
