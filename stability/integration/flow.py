@@ -44,6 +44,13 @@ class Flow:
     by_parameter: Array | None = None
     _dense: tuple[Array, Array] | None = field(default=None, repr=False)
 
+    @property
+    def times(self) -> Array:
+        """(steps + 1,) ends of the steps (only with dense=True)."""
+        if self._dense is None:
+            raise InputError("this flow was integrated without dense output: pass dense=True")
+        return self._dense[0]
+
     def __call__(self, t: Any) -> Array:
         """x(t): (n,) for a number, (n, N) for an array of times inside the interval (only with dense=True)."""
         if self._dense is None:
