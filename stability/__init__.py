@@ -21,6 +21,8 @@ _EXPORTS: dict[str, str] = {
     "FixedPoint": "results.solutions",
     "Equilibrium": "problems.equilibria",
     "Branch": "results.branch",
+    "Collocation": "problems.collocation",
+    "Shooting": "problems.shooting",
     "chart": "charting.charts",
     "StabilityChart": "results.chart",
     "ConstantAcceleration": "systems.excitation",
