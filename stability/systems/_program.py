@@ -24,7 +24,7 @@ import sympy as sp
 from sympy.core.relational import Relational
 
 from ..errors import EquationError
-from .expressions import PowerLog, differentiate
+from .expressions import PowerLog, alternatives, differentiate
 
 __all__ = ["Equations", "Program"]
 
@@ -200,8 +200,10 @@ def replaced(expression: sp.Expr, known: Mapping[sp.Basic, sp.Basic]) -> sp.Expr
 
 
 def _worth_sharing(node: sp.Basic) -> bool:
-    """Not conditions, not scaled symbols, not the parts of sign(u)|u|^p: its derivative rule needs them together."""
+    """Not conditions, scaled symbols, or what a derivative rule must see: parts of sign(u)|u|^p, selections."""
     if not isinstance(node, sp.Expr) or not node.args or isinstance(node, (sp.Abs, sp.sign)):
+        return False
+    if alternatives(node) is not None:
         return False
     if isinstance(node, sp.Pow) and (isinstance(node.base, sp.Abs) or (node.exp.is_Integer and node.base.is_Symbol)):
         return False

@@ -7,6 +7,7 @@ right-hand side is evaluated at points, so its derivatives here are the one-side
     d sign(u) |u|^p = p |u|^(p-1) u'                       d |u|^p = p |u|^(p-1) sign(u) u'
     d max(u, v) = u' where u >= v, else v'                 d Mod(u, v) = u' - floor(u/v) v'
     d Piecewise = branch by branch, the conditions kept    d u^p/dp = u^p log u, and 0 at u = 0 for p > 0
+    d max(u, v)^p, d Piecewise^p = branch by branch, too   (contact laws: 0 out of contact in every derivative)
 
 At a tie of `Max` or `Min` the argument that sympy lists first gives the derivative, always. A point where the true
 derivative is infinite (|u|^(1/2) at 0) stays infinite. Every consumer (evaluators, averaging) uses `differentiate`,
@@ -27,9 +28,10 @@ from sympy.core.function import AppliedUndef
 from ..errors import CompileError
 from .tables import TableFunction
 
-__all__ = ["PowerLog", "differentiate"]
+__all__ = ["PowerLog", "alternatives", "differentiate"]
 
 Memo = dict[sp.Basic, sp.Expr]
+Pairs = list[tuple[sp.Expr, sp.Basic]]
 
 
 class PowerLog(sp.Function):
@@ -129,6 +131,9 @@ def _absorb_signs(product: sp.Expr) -> sp.Expr:
 
 def _power(node: sp.Pow, symbol: sp.Symbol, memo: Memo) -> sp.Expr:
     base, exponent = node.args
+    pairs = None if exponent.is_Integer and exponent.is_positive else alternatives(base)
+    if pairs is not None:
+        return _branches(sp.Piecewise(*((value**exponent, c) for value, c in pairs), evaluate=False), symbol, memo)
     base_slope, exponent_slope = _derivative(base, symbol, memo), _derivative(exponent, symbol, memo)
     total = sp.S.Zero
     if base_slope != 0:
@@ -160,15 +165,42 @@ def _fraction(node: sp.Expr, symbol: sp.Symbol, memo: Memo) -> sp.Expr:
 
 def _selection(node: sp.Expr, symbol: sp.Symbol, memo: Memo) -> sp.Expr:
     """Max and Min: the slope of the argument that is chosen; at a tie the first in the argument order."""
-    slopes = [_derivative(a, symbol, memo) for a in node.args]
-    if all(s == slopes[0] for s in slopes):
-        return slopes[0]
+    pairs = [(_derivative(value, symbol, memo), condition) for value, condition in _chosen(node)]
+    if all(slope == pairs[0][0] for slope, _ in pairs):
+        return pairs[0][0]
+    return sp.Piecewise(*pairs, evaluate=False)
+
+
+def _chosen(node: sp.Expr) -> Pairs:
+    """Max and Min as values with conditions."""
     wins = sp.Ge if isinstance(node, sp.Max) else sp.Le
-    pairs = []
-    for i, (argument, slope) in enumerate(zip(node.args[:-1], slopes[:-1], strict=True)):
+    pairs: Pairs = []
+    for i, argument in enumerate(node.args[:-1]):
         tests = [wins(argument, other, evaluate=False) for other in node.args[i + 1 :]]
-        pairs.append((slope, tests[0] if len(tests) == 1 else sp.And(*tests, evaluate=False)))
-    return sp.Piecewise(*pairs, (slopes[-1], True), evaluate=False)
+        pairs.append((argument, tests[0] if len(tests) == 1 else sp.And(*tests, evaluate=False)))
+    return [*pairs, (node.args[-1], sp.true)]
+
+
+def alternatives(node: sp.Basic) -> Pairs | None:
+    """Values with conditions of a selection, also under a modulus or as a factor; None where nothing is selected.
+
+    A power is differentiated alternative by alternative: max(u, 0)^(3/2) has second derivative 0 where u < 0, but the
+    chain rule through the maximum gives max(u, 0)^(-1/2) times 0, which is NaN.
+    """
+    if isinstance(node, (sp.Max, sp.Min)):
+        return _chosen(node)
+    if isinstance(node, sp.Piecewise):
+        return [tuple(pair.args) for pair in node.args]
+    if isinstance(node, sp.Abs):
+        inner = alternatives(node.args[0])
+        return None if inner is None else [(sp.Abs(value), condition) for value, condition in inner]
+    if isinstance(node, sp.Mul):
+        for i, factor in enumerate(node.args):
+            inner = alternatives(factor)
+            if inner is not None:
+                rest = sp.Mul(*node.args[:i], *node.args[i + 1 :])
+                return [(rest * value, condition) for value, condition in inner]
+    return None
 
 
 def _branches(node: sp.Piecewise, symbol: sp.Symbol, memo: Memo) -> sp.Expr:

@@ -197,6 +197,31 @@ def test_power_law_spring_has_finite_derivatives_at_rest():
         assert not F.any() and not Fp.any() and not J[:, 1].any()
 
 
+CONTACTS = {
+    "maximum": sp.Max(x - 1, 0) ** 1.5,
+    "scaled": (b * sp.Max(x - 1, 0)) ** 1.5 / b**1.5,
+    "piecewise": sp.Piecewise((x - 1, x > 1), (0, True)) ** 1.5,
+    "modulus": sp.Abs(sp.Piecewise((x - 1, x > 1), (0, True))) ** 1.5,
+    "parameter": sp.Max(x - 1, 0) ** (a + 1.1),
+}
+
+
+@pytest.mark.parametrize("name", CONTACTS)
+@pytest.mark.parametrize("backend", ["llvm", "lambdify"])
+def test_contact_law_out_of_contact(name, backend):
+    """Hertz contact max(x - 1, 0)^(3/2): all derivatives are 0 at x < 1 (not 0 * inf), closed forms at x > 1."""
+    e = evaluator(system_of(v, -CONTACTS[name] + sp.Max(x - 1, 0) * 0.2), backend)
+    X, P = np.array([[0.4, 0.0], [1.36, 0.0]]), [0.4, 1.3, 2.0]
+    along = np.array([1.0, 0, 0, 0, 0])
+    F, J = e.FJ(0.0, X, P)
+    second, third = e.second(0.0, X, P, along, along), e.third(0.0, X, P, along, along, along)
+    np.testing.assert_allclose(F[:, 1], [0, -0.216 + 0.072], atol=1e-15)
+    np.testing.assert_allclose(J[:, 1, 0], [0, -1.5 * 0.6 + 0.2], atol=1e-15)
+    np.testing.assert_allclose(second[:, 1], [0, -0.75 / 0.6], rtol=1e-13)
+    np.testing.assert_allclose(third[:, 1], [0, 0.375 / 0.216], rtol=1e-13)
+    assert np.isfinite(e.FJP(0.0, X, P)[2]).all()
+
+
 def test_nan_in_gives_nan_out():
     """No operation, not even a comparison, may turn NaN into a number silently (Max, Min, sign, tables, remainders)."""
     for name in ("max", "min", "sign", "heaviside", "mod", "floor", "table", "abs", "powers"):
