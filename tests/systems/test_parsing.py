@@ -285,22 +285,32 @@ def _grow(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
 
 
 _texts = st.recursive(_leaves, _grow, max_leaves=12)
-_POINT = {"x": 0.7310585, "y": -1.2337005, "k": 2.4142135, "x_dot": 0.3183098}
+_POINTS = [
+    {"x": 0.7310585, "y": -1.2337005, "k": 2.4142135, "x_dot": 0.3183098},
+    {"x": -2.2360679, "y": 0.5772156, "k": 0.9159655, "x_dot": -1.3247179},
+    {"x": 1.6180339, "y": 2.6854520, "k": -0.2614972, "x_dot": 4.6692016},
+]
 _PYTHON = {
     "__builtins__": {}, "sin": math.sin, "cos": math.cos, "atan": math.atan, "tanh": math.tanh, "abs": abs,
     "sign": lambda v: (v > 0) - (v < 0), "asinh": math.asinh, "heaviside": lambda v: 0.5 if v == 0 else float(v > 0),
     "floor": math.floor, "max": max, "min": min, "atan2": math.atan2, "mod": lambda p, q: p - q * math.floor(p / q),
-    "where": lambda c, yes, no: yes if c else no, "pi": math.pi, "E": math.e, **_POINT,
+    "where": lambda c, yes, no: yes if c else no, "pi": math.pi, "E": math.e,
 }  # fmt: skip
+_JUMPS = ("floor", "sign", "heaviside", "mod", "where", "atan2", "max", "min", "abs")
 
 
-def _value(expression: sp.Expr) -> float:
-    return float(expression.xreplace({sp.Symbol(n, real=True): sp.Float(v) for n, v in _POINT.items()}))
+def _python(text: str, point: dict[str, float], change: float = 0.0) -> float:
+    """Python's value of a text of the grammar below, at a point moved by a relative change; NaN where it has none."""
+    try:
+        values = {name: value * (1 + change) for name, value in point.items()}
+        return float(eval(text.replace("x'", "x_dot"), {**_PYTHON, **values}))  # noqa: S307 (our own grammar, as witness)
+    except (ArithmeticError, ValueError):
+        return math.nan
 
 
-def _jumps(text: str) -> bool:
-    """Text whose value may jump within rounding: there two correct evaluations need not agree."""
-    return any(word in text for word in ("floor", "sign", "heaviside", "mod", "where", "atan2", "max", "min", "abs"))
+def _sympy(expression: sp.Expr, point: dict[str, float]) -> float:
+    value = expression.xreplace({sp.Symbol(n, real=True): sp.Float(v) for n, v in point.items()})
+    return float(value) if value.is_real else math.nan
 
 
 def _check_grammar_text(text: str) -> None:
@@ -311,25 +321,15 @@ def _check_grammar_text(text: str) -> None:
     tree = to_tree(expression)
     again = from_tree(tree)
     assert to_tree(again) == tree
-    try:
-        expected = eval(text.replace("x'", "x_dot"), dict(_PYTHON))  # noqa: S307 (our own grammar, as a witness)
-    except (ArithmeticError, ValueError):
-        return
-    got, back = _value(expression), _value(again)
-    if not _jumps(text) and abs(expected) < 1e12:
+    agreed = []
+    for point in _POINTS:
+        expected, moved = _python(text, point), _python(text, point, 1e-13)
         scale = max(1.0, abs(expected))
-        if _conditioned(text, expected):
-            assert abs(got - expected) <= 1e-9 * scale, (text, got, expected)
-            assert abs(back - expected) <= 1e-9 * scale, (text, back, expected)
-
-
-def _conditioned(text: str, expected: float) -> bool:
-    """Whether a change of the point by 1e-13 leaves the value within 1e-10 (else rounding alone may move it more)."""
-    moved = {**_PYTHON, **{n: v * (1 + 1e-13) for n, v in _POINT.items()}}
-    try:
-        return abs(eval(text.replace("x'", "x_dot"), moved) - expected) <= 1e-10 * max(1.0, abs(expected))  # noqa: S307
-    except (ArithmeticError, ValueError):
-        return False
+        if not scale < 1e12 or not abs(moved - expected) <= 1e-10 * scale:
+            continue  # no value, or so sensitive that rounding alone moves it
+        agreed.append(all(abs(_sympy(e, point) - expected) <= 1e-9 * scale for e in (expression, again)))
+    # where 3*x - x - x - x is rounded in Python and 0 in sympy, a jump may differ; but hardly at every point
+    assert not agreed or (any(agreed) if any(word in text for word in _JUMPS) else all(agreed)), text
 
 
 _quick = settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
