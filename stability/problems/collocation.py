@@ -258,7 +258,7 @@ class Collocation(OrbitDiscretisation):
         else:
             before_p[index] -= dl[0, mesh.own]
             size = np.sqrt((weights * dY[1] ** 2).sum() + weight_T * t_period**2 + (weight * t_parameter) ** 2)
-            new = Tangent(direction / size, t_parameter / size, weight)
+            new = Tangent(direction / size, float(t_parameter / size), weight)
         linearisation = CollocationLinearisation(self, before, before_p, work, sign) if mesh is self.mesh else work
         if mesh is self.mesh and arc:
             self._memo["tangent"] = (u, index, new)
