@@ -14,7 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..words import Verdict
-from .style import GROWTH_MAP, VERDICT_FILLS, axis_label, boundary_line
+from .style import ABOVE, GROWTH_MAP, VERDICT_FILLS, axis_label, boundary_line
 
 if TYPE_CHECKING:
     from ..results.chart import StabilityChart
@@ -108,13 +108,16 @@ def _draw_boundaries(chart: StabilityChart, ax: Any, legend: bool) -> None:
         named.add(curve.kind)
         ax.plot(curve.x, curve.y, label=label, **boundary_line(curve.kind))
     if legend and len(named) > 1:
-        ax.legend(loc="upper right", fontsize="small", framealpha=0.9)
+        ax.legend(**ABOVE)
 
 
 def _label_orders(chart: StabilityChart, ax: Any) -> None:
     """The order of each tongue below its tip, or where a pair of boundary curves meets the lower edge."""
+    from matplotlib.patheffects import withStroke
+
     height, width = chart.y[-1] - chart.y[0], chart.x[-1] - chart.x[0]
-    style = {"ha": "center", "fontsize": "small", "clip_on": True}
+    halo = [withStroke(linewidth=2.5, foreground="white")]
+    style = {"ha": "center", "fontsize": "small", "clip_on": True, "path_effects": halo}
     done = set()
     for tip in chart.tips:
         if tip.order is not None and tip.order not in done:

@@ -5,7 +5,7 @@ never said by colour alone, so that a grey print says it too:
 
     stable solid, unstable dashed, undetermined dotted, neutral dash-dotted      (the line's style)
     one marker and one fill per kind of special point                            (the marker's shape)
-    growth rate: cividis (monotone in lightness), stable parts white             (the surface's lightness)
+    growth rate: pale yellow to dark blue, darker is faster; stable parts white   (the surface's lightness)
     a boundary at multiplier +1 solid, at -1 dashed, of a complex pair dotted    (the boundary's style)
 
 Nothing here touches matplotlib's global state: the values are passed to the artists.
@@ -23,6 +23,7 @@ from typing import Any
 from ..words import Crossing, Kind, Verdict
 
 __all__ = [
+    "ABOVE",
     "BOUNDARIES",
     "COLOURS",
     "GROWTH_MAP",
@@ -67,7 +68,7 @@ VERDICT_FILLS: Mapping[Verdict, str] = MappingProxyType({
     Verdict.UNSTABLE: COLOURS["sky"],
 })  # fmt: skip
 
-GROWTH_MAP = "cividis_r"
+GROWTH_MAP = "YlGnBu"
 
 # one marker per kind; filled where the point is of codimension one, open where of codimension two
 MARKERS: Mapping[Kind, str] = MappingProxyType({
@@ -102,6 +103,18 @@ BOUNDARIES: Mapping[Crossing, tuple[str, Any]] = MappingProxyType({
     Crossing.PLUS_ONE: (COLOURS["black"], "solid"),
     Crossing.MINUS_ONE: (COLOURS["vermilion"], (0.0, (5.0, 1.5))),
     Crossing.PAIR: (COLOURS["blue"], (0.0, (1.5, 1.2))),
+})  # fmt: skip
+
+# a legend above the axes, at the right: it never covers data
+ABOVE: Mapping[str, Any] = MappingProxyType({
+    "loc": "lower right",
+    "bbox_to_anchor": (1.0, 1.0),
+    "ncols": 3,
+    "fontsize": "small",
+    "frameon": False,
+    "borderaxespad": 0.2,
+    "handlelength": 2.6,
+    "columnspacing": 1.4,
 })  # fmt: skip
 
 _GREEK = frozenset({
