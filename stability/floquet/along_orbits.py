@@ -27,7 +27,7 @@ __all__ = ["orbit_generator"]
 Array = NDArray[np.float64]
 
 _RESIDUAL = 1e-5  # relative; differences of an orbit of tolerance 1e-9 stay below
-_PROBES: NDArray[np.float64] = (np.arange(24) + 0.37) / 24.0
+_PROBES: NDArray[np.float64] = np.asarray((np.arange(24) + 0.37) / 24, dtype=np.float64)
 
 
 def orbit_generator(system: Any, orbit: Any, P: Array) -> tuple[Callable[[Array], Array], float, Array]:

@@ -35,7 +35,7 @@ __all__ = ["Monodromy", "monodromy"]
 
 Array = NDArray[np.float64]
 _FIRST_STEPS, _MAX_STEPS = 16, 32768
-_PROBES: NDArray[np.float64] = (np.arange(16) + 0.37) / 16.0
+_PROBES: NDArray[np.float64] = np.asarray((np.arange(16) + 0.37) / 16, dtype=np.float64)
 _LIMIT = 1e150  # entries of M beyond this: no multipliers, but a typed error
 
 
@@ -57,8 +57,16 @@ class Monodromy:
     kind : Crossing or None, where the largest multiplier left the unit circle; None unless unstable.
     counts : Counts of the multipliers outside the unit circle.
     trivial : int or None, index of the multiplier 1 of an autonomous orbit, which the verdict leaves out.
-    about : what the system was linearised about; `params` : the parameter values.
+    about : what the system was linearised about.
+    params : dict of the parameter values.
     steps : int, integration steps in the finest pass.
+
+    Examples
+    --------
+    >>> import stability as st
+    >>> m = st.monodromy(st.models.mathieu(a=1.0, b=0.4, Omega=2.0, delta=0.05))
+    >>> print(m.verdict, m.kind, m.multipliers.real.round(4), m.counts.beyond_minus_one)
+    unstable -1 [-1.1687 -0.625 ] 1
     """
 
     matrix: Array
