@@ -4,6 +4,9 @@ Witnesses: closed forms written by hand in numpy, differences at fixed phase, an
 """
 
 import ctypes
+import os
+import subprocess
+import sys
 import threading
 
 import numpy as np
@@ -249,6 +252,31 @@ def test_names_that_are_functions_or_generated_ones():
     want = [[np.sin(0.3) * 0.5 + 0.49, 0.98, 0.2]]
     for backend in BACKENDS:
         np.testing.assert_allclose(evaluator(system, backend).F(None, [[0.1, 0.2, 0.3]], [0.5, 2.0]), want, rtol=1e-15)
+
+
+def test_machine_code_needs_neither_scipy_nor_numba():
+    """The chart path stays light: a fresh process evaluates both back ends without them."""
+    code = (
+        "import sys, stability as st; from stability.systems.evaluators import evaluator; s = st.models.duffing();"
+        "[evaluator(s, b).FJP(0.0, [[0.1, 0.2]], s.parameter_vector()) for b in ('llvm', 'lambdify')];"
+        "print([m for m in ('scipy', 'numba', 'matplotlib') if m in sys.modules])"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stdout.strip() == "[]"
+
+
+def test_the_code_is_the_same_in_every_process():
+    """Same input, same bytes: the LLVM text does not depend on hash seeds."""
+    code = (
+        "import stability as st; from stability.systems._llvm import emit; from stability.systems._program import Equations;"
+        "e = Equations(st.models.autoparametric_pendulum()); print(emit(e.program('FJP')), emit(e.program('second')))"
+    )
+    texts = set()
+    for seed in ("1", "2", "3"):
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                             env={**os.environ, "PYTHONHASHSEED": seed})  # fmt: skip
+        texts.add(run.stdout)
+    assert len(texts) == 1 and "define void @evaluate" in texts.pop()
 
 
 def test_system_without_parameters():
