@@ -103,6 +103,12 @@ class DiscMagnet(Magnet):
         m, > 0.
     polarization : float
         Remanence Br in T, > 0.
+
+    Examples
+    --------
+    >>> from stability.models import DiscMagnet
+    >>> round(1e6 * DiscMagnet(radius=5e-3, thickness=3e-3, polarization=1.2).area, 2)     # mm^2
+    78.54
     """
 
     radius: float
@@ -136,6 +142,14 @@ class BlockMagnet(Magnet):
         Edges along x, y, z in m, > 0.
     polarization : float
         Remanence Br in T, > 0.
+
+    Examples
+    --------
+    >>> from stability.models import BlockMagnet, MagnetPair
+    >>> block = BlockMagnet(length=10e-3, width=10e-3, thickness=3e-3, polarization=1.2)
+    >>> disc = block.equal_area_disc()
+    >>> round(float(MagnetPair(block, block).force(12e-3) / MagnetPair(disc, disc).force(12e-3)), 3)
+    0.982
     """
 
     length: float

@@ -36,7 +36,15 @@ METHODS = ("exact", "quadrature", "harmonic balance")
 
 
 class Spring:
-    """What every spring can do; subclasses give `force`, `energy`, `stiffness`, `equilibria` and the expressions."""
+    """What every spring can do; subclasses give `force`, `energy`, `stiffness`, `equilibria` and the expressions.
+
+    Examples
+    --------
+    >>> from stability.models import PolynomialSpring, PowerLawSpring
+    >>> hung = PowerLawSpring(k1=100.0, kn=1e6) + PolynomialSpring((0.2,))     # with a weight of 0.2 N
+    >>> round(1e3 * hung.rest, 4), hung.odd                                    # mm
+    (-1.9283, False)
+    """
 
     motion: str = "translation"
 
@@ -150,7 +158,7 @@ class Spring:
         Notes
         -----
         Accuracy: quadrature agrees with the elliptic closed form of the cubic spring and with the Gamma-function closed
-        form of a pure power law to 1e-12 (relative).
+        form of a pure power law to 1e-12 (relative); 6e-11 at 0.999999 of the escape, where the period diverges.
 
         Examples
         --------

@@ -1,11 +1,15 @@
 """Magnets. Witnesses: Bessel integrals (mpmath), elliptic closed forms, surface-charge quadrature, dipole limit."""
 
+import dataclasses
 import math
+import pickle
 
 import mpmath
 import numpy as np
 import pytest
 import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as some
 
 import stability as st
 from stability.errors import InputError
@@ -70,6 +74,18 @@ def test_disc_integral_near_contact_and_far_away():
     far = charged_discs(1.0, 2.0, np.array([1e3, 1e5])) * np.array([1e3, 1e5]) ** 2
     np.testing.assert_allclose(far, 1.0, rtol=1e-5)  # next order: (a^2 + b^2)/z^2
     assert abs(far[1] - 1.0) < 1e-9
+
+
+@pytest.mark.parametrize(("a", "b", "z"), [(1.0, 1.0, 0.3), (1.0, 2.0, 0.5), (3.0, 2.9, 1e-3), (2.0, 0.5, -4.0)])
+def test_cylinder_faces_are_the_published_formula(a, b, z):
+    """a1 a2 a3 [K - E/a2 - (1 - a1^2/a3^2) Pi(n, m)] as in the catalogue, by mpmath's own Pi (0 times it for a = b)."""
+    mpmath.mp.dps = 40
+    a1, d = mpmath.mpf(z), mpmath.mpf(a) - mpmath.mpf(b)
+    a2, a3 = 1 + d**2 / a1**2, mpmath.sqrt((mpmath.mpf(a) + b) ** 2 + a1**2)
+    m = 4 * mpmath.mpf(a) * b / a3**2
+    third = (1 - a1**2 / a3**2) * mpmath.ellippi(m / (1 - a2), m) if d else 0
+    exact = a1 * a2 * a3 * (mpmath.ellipk(m) - mpmath.ellipe(m) / a2 - third)
+    assert math.isclose(cylinder_faces(a, b, np.array([z]))[0], float(exact), rel_tol=1e-13)
 
 
 def _overlap(half1, half2, shift, nodes=40):
@@ -248,6 +264,31 @@ def test_magnet_spring_in_a_system(name, backend):
     assert np.max(np.abs(m * values[:, 1] + spring.force(at))) <= spring.fit_error + 1e-13 * scale
     stiffness = spring.stiffness(at)
     assert np.max(np.abs(m * slopes[:, 1, 0] + stiffness)) < 1e-7 * np.max(np.abs(stiffness))
+
+
+@settings(max_examples=20, deadline=None)
+@given(stretch=some.floats(0.01, 100.0), inner=some.floats(0.5, 5.0), thick=some.floats(0.2, 10.0), gap=some.floats(0.5, 20.0))
+def test_forces_scale_with_the_area(stretch, inner, thick, gap):
+    """All lengths times s at fixed polarisation: force times s^2, k1 times s, k3 by s, energy times s^3."""
+    one, other = (
+        models.LevitatedMagnetSpring(models.RingMagnet(inner * s, 6 * s, thick * s, 1.2), gap=gap * s)
+        for s in (mm, mm * stretch)
+    )
+    np.testing.assert_allclose(other.taylor[1::2], np.array(one.taylor[1::2]) * (stretch, 1 / stretch), rtol=1e-9)
+    y = 0.4 * gap * mm
+    assert math.isclose(float(other.force(y * stretch)), float(one.force(y)) * stretch**2, rel_tol=1e-11)
+    assert math.isclose(float(other.energy(y * stretch)), float(one.energy(y)) * stretch**3, rel_tol=1e-9)
+
+
+def test_springs_are_data():
+    """Frozen, hashable, picklable, and a changed copy is a new spring."""
+    for spring in SPRINGS.values():
+        again = pickle.loads(pickle.dumps(spring))  # noqa: S301 (own bytes)
+        assert again == spring and hash(again) == hash(spring) and float(again.force(1 * mm)) == float(spring.force(1 * mm))
+    wider = dataclasses.replace(SPRINGS["levitated"], gap=16 * mm)
+    assert wider.taylor[1] < SPRINGS["levitated"].taylor[1]
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        wider.gap = 1.0
 
 
 def test_unequal_gaps_give_an_unsymmetric_spring():
