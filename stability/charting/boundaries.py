@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 
 from ..kernels.level_curves import critical_points, rim_roots, trace
 from ..kernels.propagators import step_edges, step_factors
-from ..results.chart import BoundaryCurve, StabilityChart, TongueTip
-from ..results.tiles import evaluate
+from ..results.chart import BoundaryCurve, StabilityChart, TongueTip, normalised_multipliers
+from ..results.tiles import Layer, evaluate
 from .sampling import Sampler
 
 __all__ = ["Tracer"]
@@ -37,43 +37,46 @@ Level = Callable[[Array, Array], tuple[Array, Array, Array]]
 class Tracer:
     """Finds the curves of a chart; a chart calls it at the first access to `boundaries` or `tips`."""
 
-    sampler: Sampler
+    samplers: tuple[Sampler, ...]
 
     def __call__(self, chart: StabilityChart) -> tuple[list[BoundaryCurve], list[TongueTip]]:
         """Boundary curves and tips, in the chart's own coordinates, ordered by kind and position."""
         curves: list[BoundaryCurve] = []
         tips: list[TongueTip] = []
-        for kind, level in _levels(chart):
-            found, bottoms = _curves_of(chart, level)
-            for path in found:
-                for piece in _limits(chart, path):
-                    middle = piece[len(piece) // 2]
-                    order = self._order(middle[0], middle[1], kind)
-                    curves.append(BoundaryCurve(piece[:, 0], piece[:, 1], _kind(chart, middle, kind), order))
-            for x, y in bottoms:
-                if len(_limits(chart, np.array([[x, y]]))):
-                    tips.append(TongueTip(float(x), float(y), _kind(chart, (x, y), kind), self._order(x, y, kind)))
+        for sampler, layer in zip(self.samplers, chart.layers, strict=True):
+            for kind, level in _levels(layer):
+                found, bottoms = _curves_of(chart, level)
+                for path in found:
+                    for piece in _limits(chart, path):
+                        middle = piece[len(piece) // 2]
+                        order = _order(sampler, middle[0], middle[1], kind)
+                        curves.append(BoundaryCurve(piece[:, 0], piece[:, 1], _kind(chart, middle, kind), order))
+                for x, y in bottoms:
+                    if _limits(chart, np.array([[x, y]])):
+                        order = _order(sampler, x, y, kind)
+                        tips.append(TongueTip(float(x), float(y), _kind(chart, (x, y), kind), order))
         curves.sort(key=lambda c: (c.order is None, c.order or 0, c.kind, float(c.x[0])))
         tips.sort(key=lambda t: (t.order is None, t.order or 0, t.x))
         return curves, tips
 
-    def _order(self, x: float, y: float, kind: str) -> int | None:
-        """Tongue order at a point, for scalar equations."""
-        structure, linear = self.sampler.structure, self.sampler.linear
-        if not structure.scalar or kind not in ("+1", "-1"):
-            return None
-        P = self.sampler.parameters(np.array([x]), np.array([y]))
-        period, field = linear.period(P), linear.bind(P)
-        factors = step_factors(lambda s: field(s) * period[:, None, None], step_edges(400, linear.breaks(P)))[:, 0]
-        vector, turned, angle = np.array([1.0, 0.0]), 0.0, 0.0
-        for factor in factors:
-            vector = factor @ vector
-            vector /= np.hypot(*vector)
-            new = np.arctan2(-vector[1], vector[0])
-            turned += np.mod(new - angle + np.pi, 2.0 * np.pi) - np.pi
-            angle = new
-        parity = 0 if kind == "+1" else 1
-        return max(parity, 2 * int(np.rint((turned / np.pi - parity) / 2.0)) + parity)
+
+def _order(sampler: Sampler, x: float, y: float, kind: str) -> int | None:
+    """Tongue order at a point, for scalar equations."""
+    structure, linear = sampler.structure, sampler.linear
+    if not structure.scalar or kind not in ("+1", "-1"):
+        return None
+    P = sampler.parameters(np.array([x]), np.array([y]))
+    period, field = linear.period(P), linear.bind(P)
+    factors = step_factors(lambda s: field(s) * period[:, None, None], step_edges(400, linear.breaks(P)))[:, 0]
+    vector, turned, angle = np.array([1.0, 0.0]), 0.0, 0.0
+    for factor in factors:
+        vector = factor @ vector
+        vector /= np.hypot(*vector)
+        new = np.arctan2(-vector[1], vector[0])
+        turned += np.mod(new - angle + np.pi, 2.0 * np.pi) - np.pi
+        angle = new
+    parity = 0 if kind == "+1" else 1
+    return max(parity, 2 * int(np.rint((turned / np.pi - parity) / 2.0)) + parity)
 
 
 def _unit(chart: StabilityChart) -> tuple[Array, Array]:
@@ -82,15 +85,15 @@ def _unit(chart: StabilityChart) -> tuple[Array, Array]:
     return 0.5 * (lo + hi), 0.5 * (hi - lo)
 
 
-def _levels(chart: StabilityChart) -> list[tuple[str, Level]]:
+def _levels(layer: Layer) -> list[tuple[str, Level]]:
     """The functions whose zeros are the boundary curves, with the kind of each."""
 
     def fields(x: Array, y: Array) -> tuple[Array, Array, Array]:
-        return evaluate(chart.tiles, x, y)
+        return evaluate(layer.tiles, x, y)
 
     def critical(x: Array, y: Array) -> tuple[Array, Array, Array]:
         """theta_c = -sigma T and its gradient."""
-        value, in_x, in_y = evaluate(chart.tiles, x, y, "clock")
+        value, in_x, in_y = evaluate(layer.tiles, x, y, "clock")
         chi, sigma = value
         parts = [-(d[1] * chi - sigma * d[0]) / chi**2 for d in (in_x, in_y)]
         return -sigma / chi, parts[0], parts[1]
@@ -121,30 +124,30 @@ def _levels(chart: StabilityChart) -> list[tuple[str, Level]]:
 
         return level
 
-    if chart.form == "hill":
-        if chart.neutral:
+    if layer.form == "hill":
+        if layer.neutral:
             return [("+1", factor(0)), ("+1", factor(1)), ("-1", factor(2)), ("-1", factor(3))]
         return [("+1", product(0, 1.0)), ("-1", product(2, -1.0))]
-    if chart.form == "two":
+    if layer.form == "two":
         return [("+1", trace_level(1.0)), ("-1", trace_level(-1.0))]
-    if chart.neutral:
-        return _reciprocal_levels(chart) if chart.form == "reciprocal" else []
-    return [("any", _largest_multiplier(chart))]
+    if layer.neutral:
+        return _reciprocal_levels(layer) if layer.form == "reciprocal" else []
+    return [("any", _largest_multiplier(layer))]
 
 
-def _reciprocal_levels(chart: StabilityChart) -> list[tuple[str, Level]]:
+def _reciprocal_levels(layer: Layer) -> list[tuple[str, Level]]:
     """P(1), P(-1) and the discriminant for undamped systems of two degrees of freedom."""
 
     def combination(sign: float) -> Level:
         def level(x: Array, y: Array) -> tuple[Array, Array, Array]:
-            v, *slopes = evaluate(chart.tiles, x, y)
+            v, *slopes = evaluate(layer.tiles, x, y)
             out = [d[1] - sign * (d[0] + d[2]) for d in slopes]
             return v[1] + 2.0 - sign * (v[0] + v[2]), out[0], out[1]
 
         return level
 
     def discriminant(x: Array, y: Array) -> tuple[Array, Array, Array]:
-        v, *slopes = evaluate(chart.tiles, x, y)
+        v, *slopes = evaluate(layer.tiles, x, y)
         c1 = 0.5 * (v[0] + v[2])
         out = [c1 * (d[0] + d[2]) - 4.0 * d[1] for d in slopes]
         return c1 * c1 - 4.0 * v[1] + 8.0, out[0], out[1]
@@ -152,13 +155,13 @@ def _reciprocal_levels(chart: StabilityChart) -> list[tuple[str, Level]]:
     return [("+1", combination(1.0)), ("-1", combination(-1.0)), ("pair", discriminant)]
 
 
-def _largest_multiplier(chart: StabilityChart) -> Level:
+def _largest_multiplier(layer: Layer) -> Level:
     """log|mu| of the largest multiplier, with its gradient from left and right eigenvectors."""
-    n = chart.states
+    n = layer.states
 
     def level(x: Array, y: Array) -> tuple[Array, Array, Array]:
-        v, *slopes = evaluate(chart.tiles, x, y)
-        (chi, sigma), *clock_slopes = evaluate(chart.tiles, x, y, "clock")
+        v, *slopes = evaluate(layer.tiles, x, y)
+        (chi, sigma), *clock_slopes = evaluate(layer.tiles, x, y, "clock")
         M = v[-n * n :].T.reshape(-1, n, n)
         values, right = np.linalg.eig(M)
         lead = np.abs(values).argmax(axis=1)
@@ -270,10 +273,12 @@ def _with_special(path: Array, special: Array) -> Array:
 
 def _limits(chart: StabilityChart, path: Array) -> list[Array]:
     """The pieces of a path on which it is the limit of stability (the largest multiplier has modulus 1)."""
-    growth = np.array(_growth(chart, path[:, 0], path[:, 1]))
-    chi, sigma = evaluate(chart.tiles, path[:, 0], path[:, 1], "clock")[0]
-    scale = np.maximum(np.abs(sigma), chi)
-    on = (growth <= 1e-5 * scale) & (sigma <= 1e-12 * scale)
+    on = np.ones(len(path), dtype=bool)
+    for layer in chart.layers:
+        chi, sigma = evaluate(layer.tiles, path[:, 0], path[:, 1], "clock")[0]
+        growth = sigma + chi * _theta(layer, path)
+        scale = np.maximum(np.abs(sigma), chi)
+        on &= (growth <= 1e-5 * scale) & (sigma <= 1e-12 * scale)
     if on.all():
         return [path]
     pieces, start = [], None
@@ -287,10 +292,11 @@ def _limits(chart: StabilityChart, path: Array) -> list[Array]:
     return pieces
 
 
-def _growth(chart: StabilityChart, x: Array, y: Array) -> Sequence[float]:
-    """Growth rates at points."""
-    window = [np.clip(v, axis[0], axis[-1]) for v, axis in ((x, chart.x), (y, chart.y))]
-    return [chart.at(**{chart.x_name: a, chart.y_name: b}).growth_rate for a, b in zip(*window, strict=True)]
+def _theta(layer: Layer, path: Array) -> Array:
+    """log of the largest modulus of the normalised multipliers at points (B, 2)."""
+    fields = evaluate(layer.tiles, path[:, 0], path[:, 1])[0]
+    each = [normalised_multipliers(layer.form, f, layer.states) for f in fields.T]
+    return np.log(np.abs(np.array(each)).max(axis=1))
 
 
 def _kind(chart: StabilityChart, point: Sequence[float] | Array, kind: str) -> str:

@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, ResourceLimitError, check_names
 from ..floquet.linearisation import linearise
-from ..floquet.structure import structure
+from ..floquet.structure import blocks, structure
 from ..results.categories import KINDS, VERDICTS, Categories
 from ..results.chart import StabilityChart
+from ..results.tiles import Layer
 from .boundaries import Tracer
-from .painting import paint, worst_error
+from .painting import Picture, combine, paint, worst_error
 from .sampling import Sampler
 from .tensors import build_tiles
 
@@ -110,19 +111,34 @@ def chart(
     high = system.parameter_vector(**params, **{x_name: x_hi, y_name: y_hi})
     linear = linearise(system, about)
     names = list(system.parameters)
-    found = structure(linear, np.array([low, high]))
-    sampler = Sampler(linear, low, names.index(x_name), names.index(y_name), found, (x_lo, y_lo), (x_hi, y_hi))
-    form = sampler.form
-    tiles = build_tiles(sampler, (x_lo, x_hi, y_lo, y_hi), tolerance, lambda tile: worst_error(tile, form, tolerance))
-    neutral = found.trace_free and (linear.n == 2 or sampler.is_reciprocal)
+    corners = np.array([low, high])
+    window = (x_lo, x_hi, y_lo, y_hi)
     grid_x, grid_y = np.linspace(x_lo, x_hi, nx), np.linspace(y_lo, y_hi, ny)
-    picture = paint(tiles, form, neutral, grid_x, grid_y, tolerance)
+    samplers, layers = [], []
+    picture: Picture | None = None
+    for rows in blocks(linear, corners):
+        part = linear.block(rows)
+        sampler = Sampler(part, low, names.index(x_name), names.index(y_name), structure(part, corners), window)
+        layer = _layer(sampler, tolerance)
+        painted = paint(layer.tiles, layer.form, layer.neutral, grid_x, grid_y, tolerance)
+        picture = painted if picture is None else combine(picture, painted)
+        samplers.append(sampler)
+        layers.append(layer)
+    assert picture is not None
     fixed = {k: v for k, v in zip(names, low.tolist(), strict=True) if k not in (x_name, y_name)}
     return StabilityChart(
         x_name, y_name, grid_x, grid_y, picture.growth,
         Categories(picture.verdict, VERDICTS), Categories(picture.kind, KINDS), picture.error,
-        fixed, system.name, form, linear.n, tiles, neutral, Tracer(sampler),
+        fixed, system.name, tuple(layers), Tracer(tuple(samplers)),
     )  # fmt: skip
+
+
+def _layer(sampler: Sampler, tolerance: float) -> Layer:
+    """Tiles of one block over the window."""
+    form, n, found = sampler.form, sampler.linear.n, sampler.structure
+    tiles = build_tiles(sampler, sampler.window, tolerance, lambda tile: worst_error(tile, form, tolerance))
+    neutral = found.trace_free and (n == 2 or sampler.is_reciprocal)
+    return Layer(form, n, neutral, tiles)
 
 
 def _axis(which: str, given: Any, system: System) -> tuple[str, float, float]:

@@ -24,7 +24,7 @@ from ..results.categories import NEUTRAL, STABLE, UNDETERMINED, UNSTABLE
 from ..results.tiles import Tile
 from .painting_many import paint_four, paint_matrix, paint_reciprocal
 
-__all__ = ["Picture", "paint", "worst_error"]
+__all__ = ["Picture", "combine", "paint", "worst_error"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -69,6 +69,17 @@ def paint(tiles: tuple[Tile, ...], form: str, neutral: bool, x: Array, y: Array,
         into = growth[rows, columns], verdict[rows, columns], kind[rows, columns]
         error = max(error, _paint_tile(tile, form, neutral, x[columns], y[rows], tolerance, into))
     return Picture(growth, verdict, kind, error)
+
+
+def combine(first: Picture, second: Picture) -> Picture:
+    """The picture of a system of two independent blocks: the larger growth rate, the more serious verdict."""
+    severity = np.array([0, 3, 1, 2], dtype=np.int8)  # stable < neutral < undetermined < unstable
+    word = np.array([0, 2, 3, 1], dtype=np.int8)
+    verdict = word[np.maximum(severity[first.verdict], severity[second.verdict])]
+    kind = np.where(second.growth > first.growth, second.kind, first.kind)
+    kind[verdict != UNSTABLE] = 0
+    growth = np.maximum(first.growth, second.growth, out=first.growth)
+    return Picture(growth, verdict, kind, max(first.error, second.error))
 
 
 def worst_error(tile: Tile, form: str, tolerance: float) -> float:

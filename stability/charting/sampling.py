@@ -41,7 +41,7 @@ class Sampler:
     linear : PeriodicLinear
     base : (m,) parameter values; columns `x` and `y` are replaced
     x, y : column numbers of the two parameters
-    low, high : corners of the window
+    window : (x0, x1, y0, y1)
     structure : Structure
     """
 
@@ -50,8 +50,7 @@ class Sampler:
     x: int
     y: int
     structure: Structure
-    low: tuple[float, float]
-    high: tuple[float, float]
+    window: tuple[float, float, float, float]
 
     @cached_property
     def form(self) -> str:
@@ -66,9 +65,8 @@ class Sampler:
     def is_reciprocal(self) -> bool:
         """Whether the polynomial of M0 is its own reciprocal at random points of the window."""
         random = np.random.default_rng(3)
-        x, y = self.low[0] + (self.high[0] - self.low[0]) * random.random(6), self.low[1] + (
-            self.high[1] - self.low[1]
-        ) * random.random(6)
+        x0, x1, y0, y1 = self.window
+        x, y = x0 + (x1 - x0) * random.random(6), y0 + (y1 - y0) * random.random(6)
         c = characteristic_coefficients(self._normalised(x, y, 256))
         return bool(np.all(np.abs(c - c[::-1]) <= 1e-8 * np.maximum(1.0, np.abs(c).max(axis=0))))
 

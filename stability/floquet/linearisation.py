@@ -26,7 +26,7 @@ chapter 1 (semi-trivial solutions).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,17 +56,23 @@ class PeriodicLinear:
     about : what the system is linearised about (see the head of this module)
     evaluator : Evaluator of the system
     columns : bool, whether A is read off from f at unit vectors (Python functions that are linear in x)
+    rows : the states that A is restricted to (a decoupled block), or None for all
     """
 
     system: System
     about: Any
     evaluator: Any
     columns: bool = False
+    rows: tuple[int, ...] | None = None
 
     @property
     def n(self) -> int:
-        """Number of states."""
-        return int(self.evaluator.n)
+        """Number of states of A."""
+        return int(self.evaluator.n) if self.rows is None else len(self.rows)
+
+    def block(self, rows: tuple[int, ...]) -> PeriodicLinear:
+        """The linear system of some of the states only (sensible where no others act on them, or they on no others)."""
+        return replace(self, rows=rows) if len(rows) < self.evaluator.n else self
 
     def A(self, phase: Any, P: Any) -> Array:
         """The matrix A at phases (K,) or (K, N) and parameters (N, m) or (m,): (K, N, n, n), per unit time."""
@@ -111,7 +117,8 @@ class PeriodicLinear:
         """``phases (K,) or (K, N) -> A (K, N, n, n)`` at fixed parameters: x* is found and checked once, here."""
         P = np.ascontiguousarray(_nodes(P))
         motion = self.motion(P)
-        count, n, m = len(P), self.n, P.shape[1]
+        count, n, m = len(P), int(self.evaluator.n), P.shape[1]
+        chosen = None if self.rows is None else np.array(self.rows)
 
         def matrix(phase: Array) -> Array:
             steps = len(phase)
@@ -122,23 +129,25 @@ class PeriodicLinear:
             values = self._jacobian(flat, states, each)
             if not np.isfinite(values).all():
                 raise self._non_finite(values, flat, each)
-            return values.reshape(steps, count, n, n)
+            values = values.reshape(steps, count, n, n)
+            return values if chosen is None else values[..., chosen[:, None], chosen]
 
         return matrix
 
     def _jacobian(self, phase: Array, states: Array, P: Array) -> Array:
         if not self.columns:
             return np.asarray(self.evaluator.FJ(phase, states, P)[1])
-        values = np.empty((phase.size, self.n, self.n))
-        for j in range(self.n):
-            unit = np.zeros((phase.size, self.n))
+        n = int(self.evaluator.n)
+        values = np.empty((phase.size, n, n))
+        for j in range(n):
+            unit = np.zeros((phase.size, n))
             unit[:, j] = 1.0
             values[:, :, j] = self.evaluator.F(phase, unit, P)
         return values
 
     def _check_zero(self, P: Array) -> None:
         """x = 0 must be a solution at all phases."""
-        F, scale = self._field(np.zeros((_PROBES.size, len(P), self.n)), P)
+        F, scale = self._field(np.zeros((_PROBES.size, len(P), self.evaluator.n)), P)
         if np.abs(F).max(initial=0.0) <= 1e-12 * scale:
             return
         worst = int(np.abs(F).max(axis=(0, 1)).argmax())
@@ -168,7 +177,7 @@ class PeriodicLinear:
 
     def _field(self, x: Array, P: Array) -> tuple[Array, float]:
         """f at the probe phases, (K, N, n), and the size of its terms (from A times states of size one)."""
-        count, n = len(P), self.n
+        count, n = len(P), int(self.evaluator.n)
         flat = np.repeat(_PROBES, count)
         each = np.tile(P, (_PROBES.size, 1))
         F, J = self.evaluator.FJ(flat, np.ascontiguousarray(x.reshape(-1, n)), each)

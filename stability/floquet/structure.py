@@ -6,6 +6,8 @@ Looked for, on random nodes of the range of parameters and phases that favour no
 * constant damping: c does not depend on t; then q = exp(-c t / 2) x with x'' + (k - c^2/4) x = 0 (Hill's equation),
   so that damping is exact algebra;
 * even: k(s0 + s) = k(s0 - s) for a phase s0 that is the same for all parameters; then half a period is enough;
+* blocks: groups of states that act on each other (strongly connected in the pattern of A). The multipliers of A are
+  those of its diagonal blocks together, so decoupled or one-way coupled parts are done one by one;
 * constant trace, and trace-free: det of the monodromy matrix is 1, so a system of two states is stable only
   neutrally.
 
@@ -23,7 +25,7 @@ from numpy.typing import NDArray
 
 from .linearisation import PeriodicLinear
 
-__all__ = ["Structure", "structure"]
+__all__ = ["Structure", "blocks", "structure"]
 
 Array = NDArray[np.float64]
 _ROUNDING = 1e-13
@@ -73,6 +75,31 @@ def structure(linear: PeriodicLinear, nodes: Array) -> Structure:
     damping = scalar and constant_trace
     centre = _centre(linear, field, probes, np.asarray(A[..., 1, 0], dtype=float)) if damping else None
     return Structure(scalar, damping, centre, constant_trace, trace_free)
+
+
+def blocks(linear: PeriodicLinear, nodes: Array) -> tuple[tuple[int, ...], ...]:
+    """Groups of states that act on each other, on the box of parameters spanned by `nodes` (N, m).
+
+    >>> import stability as st
+    >>> from stability.floquet.linearisation import linearise
+    >>> trap = linearise(st.models.paul_trap())
+    >>> blocks(trap, trap.system.parameter_vector() * [[0.5] * 3, [1.5] * 3])
+    ((0, 2), (1, 3))
+    """
+    lo, hi = nodes.min(axis=0), nodes.max(axis=0)
+    probes = lo + (hi - lo) * np.random.default_rng(21).random((5, len(lo)))
+    A = linear.bind(probes)(np.asarray((np.arange(32) + 0.37) / 32.0, dtype=np.float64))
+    size = np.abs(A).max(axis=(0, 1))
+    reach = (size > 1e-14 * size.max()) | np.eye(linear.n, dtype=bool)
+    for _ in range(linear.n):
+        reach = (reach.astype(int) @ reach.astype(int)) > 0
+    mutual = reach & reach.T
+    found: list[tuple[int, ...]] = []
+    for row in mutual:
+        group = tuple(int(i) for i in np.flatnonzero(row))
+        if group not in found:
+            found.append(group)
+    return tuple(found)
 
 
 def _centre(linear: PeriodicLinear, field: Callable[[Array], Array], probes: Array, stiffness: Array) -> float | None:

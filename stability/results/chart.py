@@ -23,13 +23,14 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, MissingDependencyError, check_names
 from ..words import Verdict
-from .categories import KINDS, NEUTRAL, STABLE, UNSTABLE, VERDICTS, Categories
+from .categories import KINDS, VERDICTS, Categories
 from .storage import register, write
-from .tiles import Tile, evaluate
+from .tiles import Layer, Tile, evaluate
 
 __all__ = ["BoundaryCurve", "ChartPoint", "StabilityChart", "TongueTip"]
 
 Array = NDArray[np.float64]
+_SEVERITY = (Verdict.STABLE, Verdict.NEUTRAL, Verdict.UNDETERMINED, Verdict.UNSTABLE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +122,7 @@ class StabilityChart:
         All other parameters.
     name : str
         Of the system.
-    form : str;  tiles : tuple of Tile;  neutral : bool
+    layers : tuple of Layer
         What the chart was painted from (see `results.tiles`).
     """
 
@@ -135,10 +136,7 @@ class StabilityChart:
     error: float
     params: Mapping[str, float]
     name: str
-    form: str
-    states: int
-    tiles: tuple[Tile, ...]
-    neutral: bool
+    layers: tuple[Layer, ...]
     _trace: Callable[[StabilityChart], tuple[Sequence[BoundaryCurve], Sequence[TongueTip]]] | None = field(default=None)
 
     def __post_init__(self) -> None:
@@ -186,21 +184,26 @@ class StabilityChart:
             if not axis[0] <= value <= axis[-1]:
                 raise InputError(f"{name} = {value:g} is outside the chart: {axis[0]:g} to {axis[-1]:g}")
         at = np.array([x]), np.array([y])
-        fields = evaluate(self.tiles, *at)[0][:, 0]
-        chi, sigma = evaluate(self.tiles, *at, "clock")[0][:, 0]
-        normal = normalised_multipliers(self.form, fields, self.states)
-        multipliers = normal * np.exp(sigma / chi)
-        growth = float(sigma + chi * np.log(np.abs(normal[0])))
-        stable = NEUTRAL if self.neutral else STABLE
-        if self.neutral and growth <= self.error:
-            verdict = stable
-        else:
-            verdict = UNSTABLE if growth > self.error else (stable if growth < -self.error else 3)
-        lead = normal[0]
-        pair = abs(lead.imag) > 1e-9 * abs(lead)
-        kind = "none" if verdict != UNSTABLE else ("pair" if pair else ("+1" if lead.real > 0 else "-1"))
+        multipliers, verdicts = [], []
+        for layer in self.layers:
+            fields = evaluate(layer.tiles, *at)[0][:, 0]
+            chi, sigma = (float(v) for v in evaluate(layer.tiles, *at, "clock")[0][:, 0])
+            normal = normalised_multipliers(layer.form, fields, layer.states)
+            rate = sigma + chi * float(np.log(np.abs(normal[0])))
+            calm = rate <= self.error if layer.neutral else rate < -self.error
+            stable = Verdict.NEUTRAL if layer.neutral else Verdict.STABLE
+            verdicts.append(Verdict.UNSTABLE if rate > self.error else (stable if calm else Verdict.UNDETERMINED))
+            multipliers.append(normal * np.exp(sigma / chi))
+        together = np.concatenate(multipliers)
+        together = together[np.argsort(-np.abs(together), kind="stable")]
+        growth = chi * float(np.log(np.abs(together[0])))
+        verdict = max(verdicts, key=_SEVERITY.index)
+        kind = "none"
+        if verdict is Verdict.UNSTABLE:
+            pair = abs(together[0].imag) > 1e-9 * abs(together[0])
+            kind = "pair" if pair else ("+1" if together[0].real > 0 else "-1")
         everything = {**self.params, self.x_name: x, self.y_name: y}
-        return ChartPoint(everything, multipliers, 1.0 / chi, growth, Verdict(VERDICTS[verdict]), kind, self.error)
+        return ChartPoint(everything, together, 1.0 / chi, growth, verdict, kind, self.error)
 
     def plot(self, kind: str = "growth_rate", ax: Any = None, **style: Any) -> Any:
         """Draw the chart: filled by growth rate or by class ("class"), boundary curves by kind, orders labelled."""
@@ -245,15 +248,16 @@ class StabilityChart:
             "x": self.x, "y": self.y, "growth_rate": self.growth_rate,
             "verdict": self.verdict.codes, "kind": self.kind.codes,
         }  # fmt: skip
-        for i, tile in enumerate(self.tiles):
+        tiles = [tile for layer in self.layers for tile in layer.tiles]
+        for i, tile in enumerate(tiles):
             arrays[f"fields_{i}"], arrays[f"clock_{i}"] = tile.fields, tile.clock
         for i, curve in enumerate(self.boundaries):
             arrays[f"curve_{i}"] = np.array([curve.x, curve.y])
         header = {
             "type": "stability-chart", "x_name": self.x_name, "y_name": self.y_name, "error": float(self.error),
-            "params": dict(self.params), "name": self.name, "form": self.form, "states": self.states,
-            "neutral": bool(self.neutral),
-            "tiles": [[list(map(float, t.box)), float(t.error), float(t.clock_error)] for t in self.tiles],
+            "params": dict(self.params), "name": self.name,
+            "layers": [[layer.form, layer.states, bool(layer.neutral), len(layer.tiles)] for layer in self.layers],
+            "tiles": [[list(map(float, t.box)), float(t.error), float(t.clock_error)] for t in tiles],
             "curves": [[c.kind, c.order] for c in self.boundaries],
             "tips": [[t.x, t.y, t.kind, t.order] for t in self.tips],
         }  # fmt: skip
@@ -262,20 +266,24 @@ class StabilityChart:
     @classmethod
     def from_storage(cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> StabilityChart:
         """The inverse of `to_storage`."""
-        tiles = tuple(
+        tiles = [
             Tile(tuple(box), arrays[f"fields_{i}"], arrays[f"clock_{i}"], error, clock_error)
             for i, (box, error, clock_error) in enumerate(header["tiles"])
-        )
+        ]
+        layers = []
+        for form, states, neutral, count in header["layers"]:
+            layers.append(Layer(form, states, neutral, tuple(tiles[:count])))
+            tiles = tiles[count:]
         curves = tuple(
             BoundaryCurve(arrays[f"curve_{i}"][0], arrays[f"curve_{i}"][1], kind, order)
             for i, (kind, order) in enumerate(header["curves"])
         )
         tips = tuple(TongueTip(x, y, kind, order) for x, y, kind, order in header["tips"])
-        kept = {k: header[k] for k in ("x_name", "y_name", "error", "params", "name", "form", "states", "neutral")}
+        kept = {k: header[k] for k in ("x_name", "y_name", "error", "params", "name")}
         return cls(
             x=arrays["x"], y=arrays["y"], growth_rate=arrays["growth_rate"],
             verdict=Categories(arrays["verdict"], VERDICTS), kind=Categories(arrays["kind"], KINDS),
-            tiles=tiles, _trace=lambda _: (curves, tips), **kept,
+            layers=tuple(layers), _trace=lambda _: (curves, tips), **kept,
         )  # fmt: skip
 
     def __repr__(self) -> str:

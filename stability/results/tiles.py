@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..kernels.chebyshev import at_points
 
-__all__ = ["Tile", "evaluate"]
+__all__ = ["Layer", "Tile", "evaluate"]
 
 Array = NDArray[np.float64]
 
@@ -42,6 +42,24 @@ class Tile:
         """Coordinates in [-1, 1] x [-1, 1]."""
         x0, x1, y0, y1 = self.box
         return (2.0 * x - x0 - x1) / (x1 - x0), (2.0 * y - y0 - y1) / (y1 - y0)
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """Tiles of one block of states (see `floquet.structure.blocks`); a chart is the maximum over its layers.
+
+    Attributes
+    ----------
+    form : what the fields are, see `charting.sampling`
+    states : number of states of the block
+    neutral : whether stable means neutrally stable
+    tiles : tuple of Tile
+    """
+
+    form: str
+    states: int
+    neutral: bool
+    tiles: tuple[Tile, ...]
 
 
 def evaluate(tiles: tuple[Tile, ...], x: Array, y: Array, which: str = "fields") -> tuple[Array, Array, Array]:
