@@ -23,8 +23,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import EquationError, InputError
 from ._evaluator import Evaluator
+from .expressions import differentiate
 
 __all__ = ["FunctionEvaluator"]
 
@@ -32,6 +33,7 @@ Array = np.ndarray
 EPS = float(np.finfo(float).eps)
 FIRST, SECOND, THIRD = EPS ** (1 / 5), EPS ** (1 / 6), EPS ** (1 / 7)  # error terms h^4 against eps/h, /h^2, /h^3
 COMPLEX_STEP = 1e-30
+LATER = 0.7390851332151607  # a time that is no multiple of anything, to see whether an autonomous function looks at t
 
 
 class FunctionEvaluator(Evaluator):
@@ -44,13 +46,29 @@ class FunctionEvaluator(Evaluator):
         self.function = system.function
         self.complex_step = complex_step
         self._breaks = tuple(system.breaks)
-        self._period_function = _as_function(system.period_expression, self.parameters)
+        self._period, self._period_slopes = None, None
+        self._time_checked = self.forced
+        if self.forced:
+            self._period, self._period_slopes = _clock(system.period_expression, self.parameters)
+            if complex_step and self._period_slopes is None:
+                raise InputError("the complex step needs the period as an expression, not as a Python function")
 
     # ------------------------------------------------------------------ the function
 
     def _values(self, phase: Array, X: Array, P: Array) -> Array:
         """f at M points: phase (M,), X (M, n), P (m,) or (M, m); possibly complex. Result (M, n)."""
         time = phase * self._period_of(P) if self.forced else phase
+        rates = self._rates(time, X, P)
+        if not self._time_checked:
+            later = self._rates(time + LATER, X, P)
+            if not np.array_equal(rates, later, equal_nan=True):
+                raise EquationError(
+                    "the function depends on t but declares no period: give from_function(..., period=...)"
+                )
+            self._time_checked = True
+        return rates
+
+    def _rates(self, time: Array, X: Array, P: Array) -> Array:
         columns = P if P.ndim == 1 else np.ascontiguousarray(P.T)
         state = np.ascontiguousarray(X.T)
         rates = self.function(time, state, **dict(zip(self.parameters, columns, strict=True)))
@@ -64,7 +82,8 @@ class FunctionEvaluator(Evaluator):
         return np.asarray(rates.T)
 
     def _period_of(self, P: Array) -> Any:
-        return self._period_function(*(P if P.ndim == 1 else P.T))
+        assert self._period is not None
+        return self._period(*(P if P.ndim == 1 else P.T))
 
     # ------------------------------------------------------------------ the back end
 
@@ -169,6 +188,12 @@ class FunctionEvaluator(Evaluator):
     # ------------------------------------------------------------------ period and breaks
 
     def _period_values(self, P: Array) -> tuple[Array, Array]:
+        period = np.broadcast_to(np.asarray(self._period_of(P), dtype=float), P.shape[:-1])
+        gradient = np.empty(P.shape)
+        if self._period_slopes is not None:
+            for j, value in enumerate(self._period_slopes(*(P if P.ndim == 1 else P.T))):
+                gradient[..., j] = value
+            return period, gradient
         h = FIRST * np.maximum(np.abs(P), 1.0)
 
         def slope(j: int) -> Array:
@@ -180,24 +205,32 @@ class FunctionEvaluator(Evaluator):
             )
             return np.asarray((4.0 * fine - coarse) / 3.0)
 
-        gradient = np.empty(P.shape)
         for j in range(self.m):
             gradient[..., j] = slope(j)
-        return np.broadcast_to(np.asarray(self._period_of(P), dtype=float), P.shape[:-1]), gradient
+        return period, gradient
 
     def _break_values(self, P: Array) -> Array:
-        return np.array([_as_function(b, self.parameters)(*P) for b in self._breaks], dtype=float)
+        return np.array([_clock(b, self.parameters)[0](*P) for b in self._breaks], dtype=float)
 
 
-def _as_function(expression: Any, parameters: tuple[str, ...]) -> Any:
-    """A callable of the parameters in order, from a number, a sympy expression or a function of keywords."""
-    if expression is None:
-        return None
+def _clock(expression: Any, parameters: tuple[str, ...]) -> tuple[Any, Any]:
+    """T and its slopes as functions of the parameters in order; no slopes where T is a Python function of keywords."""
     if callable(expression) and not hasattr(expression, "free_symbols"):
-        return lambda *values: expression(**dict(zip(parameters, values, strict=True)))
+
+        def each(*values: Any) -> Any:
+            rows = np.stack(np.broadcast_arrays(*values), axis=-1) if values else np.empty((1, 0))
+            if rows.ndim < 2:
+                return expression(**dict(zip(parameters, values, strict=True)))
+            different, place = np.unique(rows, axis=0, return_inverse=True)
+            periods = [expression(**dict(zip(parameters, row, strict=True))) for row in different]
+            return np.array(periods, dtype=float)[place.reshape(len(rows))]
+
+        return each, None
     import sympy as sp
 
     from ._lambdify import numpy_function
 
-    function = numpy_function([sp.Symbol(name, real=True) for name in parameters], [sp.sympify(expression)])
-    return lambda *values: function(*values)[0]
+    symbols = [sp.Symbol(name, real=True) for name in parameters]
+    period = sp.sympify(expression)
+    value = numpy_function(symbols, [period])
+    return lambda *values: value(*values)[0], numpy_function(symbols, [differentiate(period, s) for s in symbols])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from stability.errors import InputError
+from stability.errors import EquationError, InputError
 from stability.systems.evaluators import evaluator
 from stability.systems.system import System
 
@@ -88,10 +88,33 @@ def test_period_and_its_gradient():
     e = evaluator(FUNCTION)
     P = np.array([1.3, 0.2, 2.0])
     assert e.period(P) == pytest.approx(np.pi, rel=1e-15)
-    np.testing.assert_allclose(e.period_gradient(P), [0, 0, -np.pi / 2], atol=1e-11)
+    np.testing.assert_allclose(e.period_gradient(P), [0, 0, -np.pi / 2], atol=1e-15)
     np.testing.assert_allclose(
         e.period_gradient(np.stack([P, 2 * P])), [[0, 0, -np.pi / 2], [0, 0, -np.pi / 8]], atol=1e-11
     )
+
+
+def test_period_given_as_a_python_function():
+    """Same numbers as with the period as an expression, also with parameters of their own for every point."""
+    other = evaluator(System.from_function(rates, "q w", period=lambda Omega: 2 * np.pi / Omega))
+    phase, X, P = points(6)
+    own = P * (1 + 0.1 * np.random.default_rng(4).random((6, 3)))
+    for parameters in (P, own):
+        for got, want in zip(other.FJP(phase, X, parameters), EXACT.FJP(phase, X, parameters), strict=True):
+            np.testing.assert_allclose(got, want, rtol=0, atol=1e-10)
+        np.testing.assert_allclose(other.period(parameters), EXACT.period(parameters), rtol=1e-15)
+        np.testing.assert_allclose(other.period_gradient(parameters), EXACT.period_gradient(parameters), atol=1e-10)
+    with pytest.raises(InputError, match="complex step"):
+        evaluator(
+            System.from_function(rates, "q w", period=lambda Omega: 2 * np.pi / Omega), derivatives="complex_step"
+        )
+
+
+def test_undeclared_time_dependence_is_refused():
+    """A function that looks at t without a period would silently be frozen at t = 0."""
+    system = System.from_function(lambda t, x, *, k=1.0: -k * x + np.cos(t), "x")
+    with pytest.raises(EquationError, match="period"):
+        evaluator(system).F(None, [[0.3]], [1.0])
 
 
 def test_one_call_per_batch():
@@ -103,6 +126,7 @@ def test_one_call_per_batch():
         return [x[1], -k * x[0]]
 
     e = evaluator(System.from_function(counted, "x v"))
+    e.F(None, [[0.0, 0.0]], [4.0])  # the first call of all looks twice, whether t matters
     calls.clear()
     J = e.FJP(None, np.zeros((10, 2)), [4.0])[1]
     assert len(calls) == 1 and calls[0] == (2, 10 * (4 * 3 + 1))
