@@ -297,10 +297,35 @@ def test_unequal_gaps_give_an_unsymmetric_spring():
     assert abs(float(spring.force(spring.rest))) < 1e-12 and spring.rest != 0.0
 
 
-def test_one_sided_spring_floats_where_the_force_is_the_weight():
-    """f(h0) = m g, w^2 = -f'(h0)/m; the motion with weight in time (DOP853) has the period of the backbone."""
+def _period_in_time(law, start, guess):
+    """Second method for a period: DOP853 from rest at the upper turning point until the velocity falls through zero again."""
     from scipy.integrate import solve_ivp
 
+    def turns(_, x):
+        return x[1]
+
+    turns.direction = -1.0
+    motion = solve_ivp(
+        lambda _, x: [x[1], law(x[0])], (0, 1.2 * guess), [start, 0.0],
+        method="DOP853", rtol=1e-12, atol=1e-15, events=turns,
+    )  # fmt: skip
+    return float(motion.t_events[0][-1])
+
+
+@pytest.mark.parametrize("amplitude", [4 * mm, 11 * mm])
+def test_levitated_backbone_against_time_integration(amplitude):
+    """Up to 1 mm before contact; the elliptic closed form drives the motion."""
+    spring, pair, m = SPRINGS["levitated"], PAIRS["rings"], 0.02
+
+    def law(y):
+        return float(pair.force(12 * mm + y, "closed form") - pair.force(12 * mm - y, "closed form")) / m
+
+    period = 2 * math.pi / float(spring.backbone(amplitude, m))
+    assert math.isclose(_period_in_time(law, amplitude, period), period, rel_tol=1e-9)
+
+
+def test_one_sided_spring_floats_where_the_force_is_the_weight():
+    """f(h0) = m g, w^2 = -f'(h0)/m; the motion with weight in time (DOP853) has the period of the backbone."""
     spring, m = SPRINGS["one-sided"], 0.02
     h0 = spring.floating_gap
     assert math.isclose(float(spring.pair.force(h0, "closed form")), m * 9.81, rel_tol=1e-12)
@@ -312,16 +337,9 @@ def test_one_sided_spring_floats_where_the_force_is_the_weight():
     assert w[1] / (2 * math.pi) < 1 / (2 * math.sqrt(2 * 2 * a / 9.81))
     from stability.models._spring_motion import turning_points
 
-    def turns(_, x):
-        return x[1]
-
-    turns.direction = -1.0
-    start = turning_points(spring, a)[1]
-    motion = solve_ivp(
-        lambda _, x: [x[1], float(spring.pair.force(h0 + x[0])) / m - 9.81], (0, 1.2 * 2 * math.pi / w[1]), [start, 0.0],
-        method="DOP853", rtol=1e-12, atol=1e-15, events=turns,
-    )  # fmt: skip
-    assert math.isclose(motion.t_events[0][-1], 2 * math.pi / w[1], rel_tol=1e-9)
+    period, start = 2 * math.pi / w[1], turning_points(spring, a)[1]
+    measured = _period_in_time(lambda y: float(spring.pair.force(h0 + y)) / m - 9.81, start, period)
+    assert math.isclose(measured, period, rel_tol=1e-9)
 
 
 def test_light_weights_float_in_the_far_field():

@@ -100,6 +100,24 @@ def test_spring_in_a_system(spring, backend):
     assert again == newton and np.all(again(0.0, states.T) == newton(0.0, states.T))
 
 
+def test_printed_forms_of_the_source_fail():
+    """Errata (4), (6) inner lines, (3)-(6) for s < 0, section 3.1: the printed energies do not give the force; ours do."""
+    k1, kn, third = sp.symbols("k1 kn D3", real=True)
+    force = k1 * q + kn * q**3
+    spring = models.PowerLawSpring(1.0, 1.0)
+    ours = spring.energy_expression(q, {"k1": k1, "k3": kn})
+    assert sp.simplify(sp.diff(ours, q) - force) == 0
+    printed_4 = k1 / 2 + kn / 4 * q**4  # (4): q^2 is missing in the first term
+    assert sp.simplify(sp.diff(printed_4, q) - force) == -k1 * q
+    printed_6 = k1 * q**2 / 2 + kn / 4 * third * q**4  # (6): a factor k_n too many
+    assert sp.simplify(sp.diff(printed_6, q) - (k1 * q + third * q**3)) != 0
+    printed_45 = spring.energy_expression(q).subs(q, 2)  # section 3.1: "n = 2" has the energy k q^3/3, not k q^4/4
+    assert float(printed_45) == 6.0 != float(models.PowerLawSpring(1.0, 1.0, n=2).energy(2.0))
+    with np.errstate(invalid="ignore"):  # (3): q^n is no number for q < 0 and n = 1.5; sign(q)|q|^n is
+        assert np.isnan(np.power(-2.0, 1.5))
+    assert float(models.PowerLawSpring(0.0, 1.0, n=1.5).force(-2.0)) == -(2.0**1.5)
+
+
 # ---- expressions with symbols
 
 
