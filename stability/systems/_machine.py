@@ -58,11 +58,11 @@ class MachineCode:
     _lock = threading.Lock()
 
     def __init__(self, program: Program) -> None:
-        self.text = emit(program)
+        text = emit(program)
         arrays = len(program.directions) + max(len(program.results), OUTPUTS)
         with MachineCode._lock:
             llvm = _started()
-            module = llvm.parse_assembly(self.text)
+            module = llvm.parse_assembly(text)
             module.verify()
             machine = llvm.Target.from_default_triple().create_target_machine(
                 cpu=llvm.get_host_cpu_name(), features=_features(llvm), opt=2, codemodel="jitdefault"
