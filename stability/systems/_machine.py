@@ -18,7 +18,7 @@ from ..errors import CompileError
 from ._llvm import LIBRARY_FUNCTIONS, OUTPUTS, TWO_ARGUMENTS, emit
 from ._program import Program
 
-__all__ = ["MachineCode"]
+__all__ = ["MachineCode", "unavailable"]
 
 
 @lru_cache(maxsize=1)
@@ -50,6 +50,18 @@ def _library_address(name: str) -> int:
             continue
         return int(ctypes.cast(function, ctypes.c_void_p).value or 0)
     raise CompileError(f"the C mathematics library of this machine has no '{name}'; use backend='lambdify'")
+
+
+def unavailable() -> str:
+    """Why this machine cannot make machine code; empty where it can."""
+    try:
+        with MachineCode._lock:
+            _started()
+    except (ImportError, OSError) as error:
+        return f"llvmlite cannot be loaded ({error})"
+    except CompileError as error:
+        return str(error)
+    return ""
 
 
 class MachineCode:

@@ -9,7 +9,6 @@ that names it.
 
 from __future__ import annotations
 
-import importlib.util
 import threading
 from collections import OrderedDict
 from typing import Any
@@ -167,18 +166,17 @@ def _made(system: Any, backend: str, derivatives: str) -> Evaluator:
         from ._differences import FunctionEvaluator
 
         return FunctionEvaluator(system, complex_step=derivatives == "complex_step")
-    from . import _lambdify, _llvm
+    from . import _lambdify, _llvm, _machine
     from ._program import Equations, functions_in
 
     equations = Equations(system)
     used = functions_in([*equations.rhs, *equations.outputs])
     if backend != "lambdify":
         missing = sorted(used - _llvm.SUPPORTED)
-        present = importlib.util.find_spec("llvmlite") is not None
-        if not missing and present:
+        reason = f"no machine code for {', '.join(missing)}" if missing else _machine.unavailable()
+        if not reason:
             return LlvmEvaluator(system, equations)
         if backend == "llvm":
-            reason = f"no machine code for {', '.join(missing)}" if missing else "llvmlite is not installed"
             raise CompileError(f"{reason}; backend='lambdify' may know more")
     missing = sorted(used - _lambdify.SUPPORTED)
     if missing:

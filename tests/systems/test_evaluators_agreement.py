@@ -4,6 +4,7 @@ Three witnesses: the numpy back end (whole expressions, whole-expression derivat
 evaluation and numerical derivatives in 40 digits, and differences of the next lower derivative.
 """
 
+import sys
 from types import SimpleNamespace
 
 import mpmath
@@ -14,7 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as hs
 
 from stability.errors import CompileError
-from stability.systems import evaluators
+from stability.systems import _machine, evaluators
 from stability.systems.evaluators import evaluator
 from stability.systems.system import System
 from stability.systems.tables import Table
@@ -257,7 +258,8 @@ def test_fallback_when_machine_code_is_not_to_be_had(monkeypatch):
     expression = sp.sin(x) * x**3 + sp.Integer(17)
     want = evaluator(stand_in(expression), "llvm").FJ(None, [[0.7]], [])
     evaluators._CACHE.clear()
-    monkeypatch.setattr(evaluators.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setitem(sys.modules, "llvmlite.binding", None)  # as if it were not installed
+    _machine._started.cache_clear()
     fallback = evaluator(stand_in(expression))
     assert fallback.backend == "lambdify"
     for got, expected in zip(fallback.FJ(None, [[0.7]], []), want, strict=True):
