@@ -240,7 +240,7 @@ def _from_real(nu: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray[np.fl
     sizes = np.ceil(12.0 * 1.25 ** np.ceil(np.log(rows / 12.0) / np.log(1.25))).astype(np.int64)
     for size in np.unique(sizes):
         members = np.flatnonzero((sizes == size) & (q >= NO_COUPLING))
-        step = max(1, 100_000 // int(2 * size + 1))
+        step = max(600, 100_000 // int(2 * size + 1))
         for start in range(0, members.size, step):
             block = members[start : start + step]
             fraction = nu[block] - 2.0 * np.round(0.5 * nu[block])

@@ -34,7 +34,7 @@ __all__ = ["MAX_ORDER", "MAX_Q", "mathieu_a", "mathieu_b"]
 MAX_ORDER = 499
 MAX_Q = 1e6
 NO_COUPLING = 1e-140
-_BLOCK = 100_000  # numbers in one block of tridiagonal matrices (rows times points)
+_BLOCK, _LEAST = 100_000, 600  # numbers (rows times points) in a block of matrices, but at least so many points
 
 
 def mathieu_a(n: ArrayLike, q: ArrayLike) -> Any:
@@ -154,7 +154,7 @@ def rows_needed(highest: NDArray[np.float64], q: NDArray[np.float64]) -> NDArray
     ``(2|q|/k)^(1/3)``.
     """
     turning = np.sqrt(np.maximum(highest + 2.0 * np.abs(q), 1.0))
-    reach = turning + 14.0 * np.cbrt(2.0 * np.abs(q) / turning) + 24.0
+    reach = turning + 10.0 * np.cbrt(2.0 * np.abs(q) / turning) + 18.0
     return np.asarray(np.ceil(0.5 * reach), dtype=np.int64) + 1
 
 
@@ -177,7 +177,7 @@ def real_values(order: NDArray[np.int64], q: NDArray[np.float64], odd: bool) -> 
     while start < turn.size:
         size = int(rows[turn[start]])
         stop = start + 1
-        while stop < turn.size and rows[turn[stop]] <= 1.25 * size + 4 and (stop - start) * size < _BLOCK:
+        while stop < turn.size and rows[turn[stop]] <= 1.25 * size + 4 and stop - start < max(_BLOCK // size, _LEAST):
             stop += 1
         block = turn[start:stop]
         n, strength = order[block], q[block]

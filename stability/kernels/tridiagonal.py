@@ -28,7 +28,7 @@ __all__ = ["indexed_eigenvalues", "sturm_count"]
 
 _EPS = float(np.finfo(float).eps)
 _TINY = 1e-290
-_COARSE = 2e-4  # multisection stops at this width relative to the scale; the Newton steps do the rest
+_COARSE = 0.3  # multisection stops at this width over sqrt(scale), the size of gaps; Newton steps do the rest
 _MAX_STEPS = 80
 _NOISE = 4.0  # roundings of the scale below which a Newton step is noise; the step itself is still taken
 
@@ -125,7 +125,8 @@ def indexed_eigenvalues(
     >>> bool(abs(x[0] - np.linalg.eigvalsh(np.diag(d[:, 0]) + 0.1 * (np.eye(3, k=1) + np.eye(3, k=-1)))[1]) < 1e-15)
     True
     """
-    lower, upper = _multisection(diagonal, squares, index, lower.copy(), upper.copy(), _COARSE * scale)
+    width = _COARSE * np.sqrt(np.maximum(scale, 1.0))
+    lower, upper = _multisection(diagonal, squares, index, lower.copy(), upper.copy(), width)
     x = 0.5 * (lower + upper)
     active = np.arange(index.size)
     for _ in range(_MAX_STEPS):
