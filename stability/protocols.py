@@ -96,6 +96,7 @@ class Seed(NamedTuple):
     parameter: float  # parameter's part of the direction (0 for pitchfork, Hopf and period doubling)
     sides: int  # 1: the other half is the same solutions shifted in time; 2: both are followed and joined
     kind: Kind  # of the point it is born at
+    free: str  # the parameter along which that point was found
     avoid: tuple[Array, float] | None = None  # direction of the old branch: the first step is taken orthogonally to it
 
 

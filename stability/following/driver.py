@@ -61,7 +61,7 @@ def continuation(
         A first solution, or something near one: dict of state names, array, FixedPoint, PeriodicOrbit.
     ds, ds_max : float
         First and longest step, in the scaled norm where the window has width one and every state its own scale
-        (defaults 0.01 and 0.1).
+        (defaults 0.01 and 0.2).
     max_points : int
         At most so many points on either side.
     at : float or tuple of float
@@ -226,6 +226,11 @@ def _turned(entry: Entry) -> Entry:
 
 def _sides(seed: Seed, settings: Settings) -> tuple[Point, tuple[Follower | None, Follower | None]]:
     """The birth point and a follower that has made its first step on each side (None where that failed)."""
+    if settings.name != seed.free:
+        raise InputError(
+            f"this branch is born at a point found along '{seed.free}': continue it in '{seed.free}' first, then start "
+            f"from one of its solutions in '{settings.name}'"
+        )
     problem, weight = seed.problem, settings.weight
     w, params = problem.weights, np.array(seed.params, dtype=float)
     at = float(params[settings.index])

@@ -4,7 +4,7 @@ Between points A and B (same mesh) compare: the sign of the parameter's tangent 
 determinant (branch point), the number of real values beyond +1 and -1, of pairs outside, and of all unstable ones.
 det F_u = (determinant) x (tangent component) up to a positive factor, so the parity of the values beyond +1 changes at
 folds and branch points only; the parity of those beyond -1 only at period doublings; what then remains of the change in
-the unstable count are pairs. A step with one such event is *elementary*; any other is divided further.
+the unstable count are pairs. A step with one such event and nothing else is elementary; any other is divided further.
 
 In-and-out changes leave all integers unchanged. They are suspected where the parabola through three neighbours of a
 smooth test function (`points.smooth_tests`) reaches zero, or nearly, between them, and where the cubic Hermite
@@ -16,10 +16,13 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..words import Kind
 from .points import Point
 
-__all__ = ["Changes", "changes", "double_turn", "parabola_dip"]
+__all__ = ["Changes", "Dip", "changes", "crossed", "dip_of", "double_turn", "supported"]
 
 
 class Changes(NamedTuple):
@@ -35,33 +38,50 @@ class Changes(NamedTuple):
 
     @property
     def nothing(self) -> bool:
-        """No event at all (values that collide inside or outside the circle are none)."""
+        """No event (values that merely collide inside or outside are none, see `collision`)."""
         odd = self.known and (self.beyond_plus % 2 != (self.fold != self.branch))
         return not (self.fold or self.branch or self.unstable or self.beyond_minus % 2 or odd)
+
+    @property
+    def collision(self) -> bool:
+        """Real values became pairs or back, outside the limit; several events that cancel would look the same."""
+        return bool(self.beyond_plus or self.beyond_minus or self.pairs)
 
     def suspects(self, pair: Kind | None, minus: bool) -> list[Kind]:
         """The kinds to look for, each once."""
         kinds = [Kind.FOLD] * self.fold + [Kind.BRANCH_POINT] * self.branch
         if minus and self.beyond_minus % 2:
             kinds.append(Kind.PERIOD_DOUBLING)
-        reals = len(kinds)
-        if pair is not None and (abs(self.unstable) > reals or (abs(self.unstable) - reals) % 2):
+        if pair is not None and (self.pairs or abs(self.unstable) > len(kinds)):
             kinds.append(pair)
         return kinds
 
+    def is_one(self, kind: Kind) -> bool:
+        """Exactly one event of this kind, and no collision beside it."""
+        signs = (self.fold, self.branch)
+        integers = (abs(self.beyond_plus), abs(self.beyond_minus), abs(self.pairs))
+        if kind is Kind.FOLD:
+            return signs == (True, False) and (integers == (1, 0, 0) or not self.known)
+        if kind is Kind.BRANCH_POINT:
+            return signs == (False, True) and (integers == (1, 0, 0) or not self.known)
+        return signs == (False, False) and integers == ((0, 1, 0) if kind is Kind.PERIOD_DOUBLING else (0, 0, 1))
+
     def explained(self, kinds: list[Kind]) -> bool:
-        """Whether events of these kinds, each once, can make these changes."""
+        """Whether events of these kinds, with collisions beside them, can make these changes."""
+        folds, branches = kinds.count(Kind.FOLD), kinds.count(Kind.BRANCH_POINT)
+        if folds % 2 != self.fold or branches % 2 != self.branch:
+            return False
         if not self.known:
-            return (Kind.FOLD in kinds) == self.fold and (Kind.BRANCH_POINT in kinds) == self.branch
-        reals = sum(k in (Kind.FOLD, Kind.BRANCH_POINT, Kind.PERIOD_DOUBLING) for k in kinds)
-        pairs = sum(k in (Kind.HOPF, Kind.NEIMARK_SACKER) for k in kinds)
-        reach = reals + 2 * pairs
+            return True
+        doublings = kinds.count(Kind.PERIOD_DOUBLING)
+        reals = folds + branches + doublings
+        reach = reals + 2 * (len(kinds) - reals)
         return (
             abs(self.unstable) <= reach
             and (self.unstable - reach) % 2 == 0
-            and (reach == 0 or abs(self.unstable) > 0 or reals > 1)
-            and self.beyond_minus % 2 == kinds.count(Kind.PERIOD_DOUBLING) % 2
-            and self.beyond_plus % 2 == (kinds.count(Kind.FOLD) + kinds.count(Kind.BRANCH_POINT)) % 2
+            and (reals > 0 or len(kinds) != 1 or abs(self.unstable) == 2)
+            and self.beyond_minus % 2 == doublings % 2
+            and self.beyond_plus % 2 == (folds + branches) % 2
         )
 
 
@@ -110,21 +130,79 @@ def double_turn(a: Point, b: Point) -> float | None:
     return a.s + x * h if rate * r0 <= 0.02 * r0 * r0 else None
 
 
-def parabola_dip(points: tuple[Point, Point, Point], which: int) -> tuple[float, float] | None:
-    """(arclength, depth) of the vertex of a test function near zero between three neighbours of equal sign; else None.
+def test_value(p: Point, which: int) -> float:
+    """Test function 0 plus, 1 minus, 2 pair (`points.smooth_tests`), 3 rate of the parameter."""
+    return p.tests[which] if which < 3 else p.tangent.parameter
 
-    depth is the vertex value over the smaller neighbour: negative where the parabola crosses zero.
-    """
-    (x0, x1, x2), (y0, y1, y2) = (p.s for p in points), (p.tests[which] for p in points)
+
+class Dip(NamedTuple):
+    """Vertex of a parabola through three neighbours of equal sign, opening away from zero."""
+
+    at: float
+    depth: float  # value at the vertex over the second smallest of the three: negative where it crosses zero
+    values: tuple[float, float, float]
+
+
+def vertex(at: tuple[float, float, float], values: tuple[float, float, float]) -> Dip | None:
+    """The vertex, if it lies between the outer two; else None."""
+    (x0, x1, x2), (y0, y1, y2) = at, values
     if not (y0 * y1 > 0 and y1 * y2 > 0 and x0 < x1 < x2):
         return None
     first, second = (y1 - y0) / (x1 - x0), (y2 - y1) / (x2 - x1)
     bend = (second - first) / (x2 - x0)
-    if bend * y1 <= 0:  # the parabola opens away from zero
+    if bend * y1 <= 0:
         return None
     x = 0.5 * (x0 + x1) - first / (2 * bend)
     if not x0 < x < x2:
         return None
     value = y0 + first * (x - x0) + bend * (x - x0) * (x - x1)
-    depth = value / math.copysign(min(abs(y0), abs(y1), abs(y2)), y1)
-    return x, depth
+    return Dip(x, value / math.copysign(sorted((abs(y0), abs(y1), abs(y2)))[1], y1), values)
+
+
+def dip_of(points: tuple[Point, Point, Point], which: int) -> Dip | None:
+    """The dip of a test function: 0 plus, 1 minus, 2 pair (`points.smooth_tests`), 3 rate of the parameter.
+
+    -1: the deepest dip of any single value followed through the three (see `matched_growth`); a value that goes out and
+    comes back inside a step is smoother by itself than in a product with all the others.
+    """
+    p, q, r = points
+    at = (p.s, q.s, r.s)
+    if which >= 0:
+        return vertex(at, (_test(p, which), _test(q, which), _test(r, which)))
+    growth = matched_growth(points)
+    if growth is None:
+        return None
+    deepest = None
+    size = np.abs(growth)
+    for y0, y1, y2 in growth[:, (size[1] < size[0]) | (size[1] < size[2])].T.tolist():
+        dip = vertex(at, (y0, y1, y2))
+        if dip is not None and (deepest is None or dip.depth < deepest.depth):
+            deepest = dip
+    return deepest
+
+
+def _test(p: Point, which: int) -> float:
+    return p.tests[which] if which < 3 else p.tangent.parameter
+
+
+def matched_growth(points: tuple[Point, Point, Point]) -> NDArray[np.float64] | None:
+    """(3, n) growth Re(lambda), or log|mu|, of values matched to their nearest neighbours; None where they collide."""
+    spectra = [p.spectrum.values for p in points]
+    first, last = (np.abs(spectra[1][:, None] - spectra[k][None, :]).argmin(axis=1) for k in (0, 2))
+    n = spectra[1].size
+    if len(set(first.tolist())) < n or len(set(last.tolist())) < n:
+        return None
+    matched = np.array([spectra[0][first], spectra[1], spectra[2][last]])
+    if not points[0].problem.critical.circle:
+        return matched.real
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.log(np.abs(matched)))
+
+
+def crossed(points: tuple[Point, Point, Point], which: int) -> bool:
+    """Whether the test function (-1: a single value) has the other sign at the middle point than at both ends."""
+    if which >= 0:
+        y0, y1, y2 = (_test(p, which) for p in points)
+        return y0 * y1 < 0 and y1 * y2 < 0
+    growth = matched_growth(points)
+    return growth is not None and bool(((growth[0] * growth[1] < 0) & (growth[1] * growth[2] < 0)).any())

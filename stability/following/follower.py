@@ -15,11 +15,12 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..protocols import Corrected, Tangent
 from ..words import Kind, Status
-from .events import changes, double_turn, parabola_dip
-from .locating import Found, Locator, chord_length
+from .events import changes, crossed, dip_of, double_turn
+from .locating import Found, Locator
 from .loops import Home
 from .points import Point, dot, make_point
 from .settings import Progress, Settings
@@ -27,6 +28,7 @@ from .stepping import KINK, Comparison, compare, next_length, predict
 
 __all__ = ["Entry", "Follower"]
 
+Array = NDArray[np.float64]
 _ADAPT_EVERY = 3
 _GROWTH = 1e6
 _STALL_POINTS, _STALL = 150, 1e-10
@@ -118,7 +120,7 @@ class Follower(Iterator[Point]):
         wall = self._wall(float(found.params[settings.index]))
         if wall is not None:
             return self._land(wall, h)
-        return self._judged(found, found.tangent, h)
+        return self._judged(found, found.tangent, h, (u, parameter))
 
     def _wall(self, parameter: float) -> float | None:
         if parameter < self.settings.low:
@@ -146,12 +148,14 @@ class Follower(Iterator[Point]):
         size = math.copysign(size, side)
         tangent = Tangent(slope.u / size, 1.0 / size, weight)
         signed = found._replace(determinant_sign=found.determinant_sign * (1 if size > 0 else -1))
-        return self._judged(signed, tangent, reach)
+        return self._judged(signed, tangent, reach, (u, wall))
 
-    def _judged(self, found: Corrected, tangent: Tangent, h: float) -> tuple[Point, Comparison] | float:
+    def _judged(
+        self, found: Corrected, tangent: Tangent, h: float, guess: tuple[Array, float]
+    ) -> tuple[Point, Comparison] | float:
         last, settings = self.last, self.settings
         point = make_point(last.problem, found, tangent, settings.index, last.s, h)
-        seen = compare(last, point.u, point.parameter, tangent, point.spectrum.values)
+        seen = compare(last, point, guess)
         point = point._replace(s=last.s + seen.distance, step=seen.distance)
         if seen.worst > 1 and not h < KINK * settings.steps.longest:
             return max(0.25, 0.8 / seen.worst)
@@ -247,9 +251,7 @@ class Follower(Iterator[Point]):
     # ------------------------------------------------------------------ events of a segment
     def _search(self, a: Point, b: Point) -> list[Found]:
         """Everything special strictly between a and b (and, late, between the point before and a)."""
-        found = self.locator.resolve(a, b)
-        if not found:
-            found = self._dips(a, b)
+        found = self._bifurcations(a, b)
         own = [f for f in found if f.point.s >= a.s]
         knots = [a, *(f.point for f in sorted(own, key=lambda f: f.point.s)), b]
         if self.settings.at:
@@ -288,49 +290,83 @@ class Follower(Iterator[Point]):
                         found.append(Found(point, Kind.USER, (p.parameter, q.parameter), 0.0, name))
         return found
 
-    def _dips(self, a: Point, b: Point) -> list[Found]:
-        """In-and-out changes that the integers at a and b do not show."""
-        x = double_turn(a, b)
-        if x is not None:
-            middle = self.locator.on_curve(a, b, (x - a.s) / (b.s - a.s))
-            if middle is not None:
-                found = self.locator.resolve(a, middle) + self.locator.resolve(middle, b)
-                if found:
-                    return found
+    def _bifurcations(self, a: Point, b: Point) -> list[Found]:
+        """Events that the integers at a and b show, and in-and-out changes that they do not."""
         p = self.before
-        if p is None or p.problem is not a.problem or not b.spectrum.values.size:
-            return []
-        critical = a.problem.critical
-        wanted = [0] + [1] * (critical.minus is not None) + [2] * (critical.pair is not None)
-        for which in wanted:
-            dip = parabola_dip((p, a, b), which)
-            if dip is not None and dip[1] < _DIP:
-                ends = (a, b) if dip[0] > a.s else (p, a)
-                found = self._refine(*ends, which, dip[0])
-                if found:
-                    return found
-        return []
+        known = p is not None and p.problem is a.problem
+        here, behind = [a, b], [p, a] if known else []
+        x = double_turn(a, b)
+        cuts = [] if x is None else [(x, 3)]
+        if p is not None and known:
+            for which in self._tests(b):
+                dip = dip_of((p, a, b), which)
+                if dip is not None and dip.depth < _DIP:
+                    cuts.append((dip.at, which))
+        for x, which in cuts:
+            knots = here if x > a.s else behind
+            between = self._turning_point(knots[0], knots[-1], which, x)  # type: ignore[arg-type]
+            if between is not None:
+                knots.append(between)
+                knots.sort(key=lambda q: q.s)  # type: ignore[union-attr]
+        found: list[Found] = []
+        for knots in (behind if len(behind) > 2 else [], here):
+            for q, r in pairwise(knots):
+                found += self.locator.resolve(q, r)  # type: ignore[arg-type]
+        return [f for f in found if not self._known(f)]
 
-    def _refine(self, a: Point, b: Point, which: int, x: float) -> list[Found]:
-        """Follow the vertex of the parabola into the segment until it crosses zero or is seen not to."""
-        for _ in range(8):
-            width = b.s - a.s
-            if width <= 0 or chord_length(a, b) < 1e-7:
-                break
-            middle = self.locator.on_curve(a, b, min(0.98, max(0.02, (x - a.s) / width)))
-            if middle is None:
-                break
-            if not (changes(a, middle).nothing and changes(middle, b).nothing):
-                return self.locator.resolve(a, middle) + self.locator.resolve(middle, b)
-            dip = parabola_dip((a, middle, b), which)
-            if dip is None or dip[1] > 0.5 or not np.isfinite(dip[0]):
-                break
-            if abs(dip[0] - middle.s) < 0.01 * width:
-                # the vertex is sampled; narrow around it once more only if it is nearly zero
-                if dip[1] > 1e-3 * 1.0 and dip[1] > 0.9:
-                    break
-                a, b = (a, middle) if dip[0] < middle.s else (middle, b)
-            else:
-                a, b = (middle, b) if dip[0] > middle.s else (a, middle)
-            x = dip[0]
-        return []
+    def _known(self, found: Found) -> bool:
+        """Whether this event is among the entries already (a segment that is searched again)."""
+        for entry in reversed(self.entries):
+            if entry.point.s < found.point.s - 1e-6:
+                return False
+            same = entry.found is not None and entry.found.kind is found.kind
+            if same and abs(entry.point.s - found.point.s) < 1e-6:
+                return True
+        return False
+
+    @staticmethod
+    def _tests(b: Point) -> list[int]:
+        """Test functions to watch for dips; -1 stands for the single values."""
+        if not b.spectrum.values.size:
+            return [3]
+        critical = b.problem.critical
+        return [3, 0, -1] + [1] * (critical.minus is not None)
+
+    def _turning_point(self, a: Point, b: Point, which: int, x: float) -> Point | None:
+        """Minimise the test over the segment by parabolas: a point where it has crossed zero, or None."""
+        known = [a, b]
+        for _ in range(20):
+            new = self._inside(a, b, x)
+            if new is None or min(abs(new.s - p.s) for p in known) < 1e-9:
+                return None
+            known.append(new)
+            known.sort(key=lambda p: p.s)
+            here = next(k for k, p in enumerate(known) if p is new)
+            i = min(max(here, 1), len(known) - 2)
+            triple = (known[i - 1], known[i], known[i + 1])
+            if crossed((a, new, b), which) or crossed(triple, which):
+                return new
+            dip = dip_of(triple, which)
+            if dip is None:
+                return None
+            low = min(range(3), key=lambda k: abs(dip.values[k]))
+            if low != 1 and 0 < i - 1 + low < len(known) - 1:  # the lowest point so far becomes the middle one
+                i += low - 1
+                triple = (known[i - 1], known[i], known[i + 1])
+                dip = dip_of(triple, which)
+                if dip is None:
+                    return None
+            lowest, width = triple[1], triple[2].s - triple[0].s
+            x = dip.at
+            if abs(x - lowest.s) < 0.02 * width:
+                predicted = dip.depth * sorted(map(abs, dip.values))[1]
+                if predicted > 0.95 * abs(dip.values[1]) and width < 0.3 * (b.s - a.s):
+                    return None  # the minimum is sampled, and it is not zero
+                side = 1 if triple[2].s - lowest.s > lowest.s - triple[0].s else -1
+                x = lowest.s + side * 0.1 * width
+        return None
+
+    def _inside(self, a: Point, b: Point, s: float) -> Point | None:
+        """The point of the curve near arclength s, kept off the ends of the segment."""
+        width = b.s - a.s
+        return self.locator.on_curve(a, b, min(0.995, max(0.005, (s - a.s) / width))) if width > 0 else None

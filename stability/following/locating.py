@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,7 @@ __all__ = ["Found", "Locator", "hermite"]
 
 Array = NDArray[np.float64]
 _PAIRS = (Kind.HOPF, Kind.NEIMARK_SACKER)
+_AMBIGUOUS = 10  # halvings after which the simplest explanation of a change is taken
 _EDGE = 1e-6  # how far outside its bracket, in units of the bracket, a located point may lie
 _SIGNATURE = 1e-5  # how close to the limit the critical value of a located point must be
 
@@ -132,40 +134,41 @@ class Locator:
         return best
 
     # ------------------------------------------------------------------ events from counts
-    def resolve(self, a: Point, b: Point, depth: int = 60) -> list[Found]:
+    def resolve(self, a: Point, b: Point, level: int = 0) -> list[Found]:
         """All events between a and b, in order along the branch."""
         change = changes(a, b)
-        if change.nothing or not (change.fold or change.branch or supported(a, b)):
+        if not (change.fold or change.branch or supported(a, b)):
             return []
-        found = self._attempt_all(a, b, change)
-        if found is not None:
-            return found
-        middle = None
-        if depth > 0 and chord_length(a, b) > self.smallest:
-            middle = next((m for m in (self.on_curve(a, b, x) for x in (0.5, 0.41, 0.63)) if m is not None), None)
-        if middle is None:
-            return self._leftover(a, b, change)
-        return self.resolve(a, middle, depth - 1) + self.resolve(middle, b, depth - 1)
-
-    def _attempt_all(self, a: Point, b: Point, change: Changes) -> list[Found] | None:
+        fine = level >= _AMBIGUOUS
+        if change.nothing and (fine or not change.collision):
+            return []
         critical = a.problem.critical
         kinds = change.suspects(critical.pair, critical.minus is not None)
-        located = []
-        for kind in kinds:
-            one = self.attempt(kind, a, b)
-            if one is None:
-                return None
-            located.append(one)
-        if change.fold and change.branch:
-            # a pitchfork met on its own side branch: parameter turns and determinant vanishes at one point
-            fold = next(f for f in located if f.kind is Kind.FOLD)
-            branch = next(f for f in located if f.kind is Kind.BRANCH_POINT)
-            if abs(fold.point.s - branch.point.s) < 1e-4 * chord_length(a, b) + 1e-7:
-                located.remove(fold)
-                return sorted(located, key=lambda f: f.point.s) if abs(change.unstable) != 1 else None
-        if not change.explained([f.kind for f in located]):
-            return None
-        return sorted(located, key=lambda f: f.point.s)
+        located = [f for f in (self.attempt(kind, a, b) for kind in kinds) if f is not None]
+        located = _without_twin(change, located, chord_length(a, b))
+        located.sort(key=lambda f: f.point.s)
+        if located and self._separate(a, b, located):
+            return located
+        if fine and located and change.explained([f.kind for f in located]):
+            return located
+        middle = None
+        if level < 60 and chord_length(a, b) > self.smallest:
+            middle = next((m for m in (self.on_curve(a, b, x) for x in (0.5, 0.41, 0.63)) if m is not None), None)
+        if middle is None:
+            return [] if change.nothing else self._leftover(a, b, change)
+        return self.resolve(a, middle, level + 1) + self.resolve(middle, b, level + 1)
+
+    def _separate(self, a: Point, b: Point, located: list[Found]) -> bool:
+        """Whether the changes between points taken midway between the located events are one event each."""
+        ends = [a]
+        for f, g in pairwise(located):
+            x = (0.5 * (f.point.s + g.point.s) - a.s) / (b.s - a.s) if b.s > a.s else math.nan
+            middle = self.on_curve(a, b, x) if math.isfinite(x) else None
+            if middle is None or not f.point.s < middle.s < g.point.s:
+                return False
+            ends.append(middle)
+        ends.append(b)
+        return all(changes(p, q).is_one(f.kind) for (p, q), f in zip(pairwise(ends), located))
 
     def _leftover(self, a: Point, b: Point, change: Changes) -> list[Found]:
         """At the smallest width: what can be located at all, else one UNEXPLAINED point."""
@@ -173,8 +176,7 @@ class Locator:
         kinds = change.suspects(critical.pair, critical.minus is not None)
         located = [f for f in (self.attempt(kind, a, b, edge=1e3) for kind in kinds) if f is not None]
         if change.fold and change.branch and any(f.kind is Kind.BRANCH_POINT for f in located):
-            located = [f for f in located if f.kind is not Kind.FOLD]
-            return located
+            return [f for f in located if f.kind is not Kind.FOLD]
         if located and change.explained([f.kind for f in located]):
             return located
         point = self.on_curve(a, b, 0.5) or b
@@ -229,6 +231,15 @@ class Locator:
             problem, located.u, located.params, parameter, tangent, spectrum, tests, 0, residual, located.iterations,
             s, where * b.step,
         )
+
+
+def _without_twin(change: Changes, located: list[Found], length: float) -> list[Found]:
+    """A pitchfork met on its own side branch turns the parameter too: of fold and branch point there, the latter."""
+    if not (change.fold and change.branch):
+        return located
+    places = {f.kind: f.point.s for f in located}
+    gap = abs(places.get(Kind.FOLD, math.inf) - places.get(Kind.BRANCH_POINT, -math.inf))
+    return [f for f in located if f.kind is not Kind.FOLD] if gap < 1e-4 * length + 1e-7 else located
 
 
 def _secant(ga: float, gb: float) -> float:

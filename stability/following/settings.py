@@ -115,7 +115,7 @@ def checked(
         raise InputError(f"the window of '{name}' must be two numbers (from, to), got {window!r}") from None
     if not (math.isfinite(first) and math.isfinite(last)) or first == last:
         raise InputError(f"the window of '{name}' must be two different finite numbers, got ({first}, {last})")
-    longest = 0.1 if ds_max is None else _number("ds_max", ds_max, 0.0)
+    longest = 0.2 if ds_max is None else _number("ds_max", ds_max, 0.0)
     step = min(0.01, longest) if ds is None else _number("ds", ds, 0.0)
     if step > longest:
         raise InputError(f"ds = {step:g} is longer than ds_max = {longest:g}")

@@ -9,6 +9,7 @@ corrected orthogonally to t_0. The new point z_1 with tangent t_1 is accepted if
     angle(t_0, t_1) <= ANGLE               the curve does not turn too far,
     angle(z_1 - z_0, t_0 + t_1) <= CHORD   chord and mean tangent agree: on a smooth curve they do to second order in h,
                                            where Newton has hopped onto a crossing or a neighbouring branch they do not,
+    |z_1 - z| <= MISSED |z_1 - z_0|        nor do predictor and corrector,
     motion of the spectrum <= MOTION       Hausdorff distance of the two sets of values in the chordal metric.
 
 The next length aims at half of each limit and at few Newton iterations. Kinks of a piecewise smooth system turn by a
@@ -23,13 +24,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..protocols import Tangent
 from .points import Point, dot
 
 __all__ = ["Comparison", "Steps", "compare", "predict", "spectral_motion"]
 
 Array = NDArray[np.float64]
-ANGLE, CHORD, MOTION, KINK = 0.6, 0.2, 0.7, 1e-4
+ANGLE, CHORD, MISSED, MOTION, KINK = 0.6, 0.15, 0.2, 0.7, 1e-4
 _FEW = 3
 
 
@@ -38,7 +38,7 @@ class Steps:
     """Lengths in the weighted norm: a full window of the parameter is 1, the scale of a state is 1."""
 
     first: float = 0.01
-    longest: float = 0.1
+    longest: float = 0.2
     shortest: float = 1e-9
 
 
@@ -49,12 +49,13 @@ class Comparison:
     distance: float
     angle: float
     chord: float
+    missed: float
     motion: float
 
     @property
     def worst(self) -> float:
         """The largest ratio; above 1 the step is refused."""
-        return max(self.angle, self.chord, self.motion)
+        return max(self.angle, self.chord, self.missed, self.motion)
 
 
 def predict(last: Point, before: Point | None, h: float) -> tuple[Array, float]:
@@ -84,22 +85,24 @@ def spectral_motion(a: NDArray[np.complex128], b: NDArray[np.complex128], circle
     return float(max(gap.min(axis=1).max(), gap.min(axis=0).max()))
 
 
-def compare(last: Point, u: Array, parameter: float, tangent: Tangent, values: NDArray[np.complex128]) -> Comparison:
-    """The checks of the module's head for a candidate on the mesh of `last`."""
-    w, t0, weight = last.problem.weights, last.tangent, tangent.weight
-    du, dl = u - last.u, (parameter - last.parameter) * weight
+def compare(last: Point, new: Point, guess: tuple[Array, float]) -> Comparison:
+    """The checks of the module's head for a candidate on the mesh of `last`; `guess` is where the corrector began."""
+    w, t0, t1, weight = last.problem.weights, last.tangent, new.tangent, last.tangent.weight
+    du, dl = new.u - last.u, (new.parameter - last.parameter) * weight
     length = math.sqrt(dot(w, du, du) + dl * dl)
     wt0 = w * t0.u
-    cosine = float(wt0 @ tangent.u) + t0.parameter * tangent.parameter * weight * weight
+    cosine = float(wt0 @ t1.u) + t0.parameter * t1.parameter * weight * weight
     angle = math.acos(max(-1.0, min(1.0, cosine)))
     if length == 0:
-        return Comparison(0.0, angle / ANGLE, 0.0, 0.0)
+        return Comparison(0.0, angle / ANGLE, 0.0, 0.0, 0.0)
     first = (float(wt0 @ du) + t0.parameter * weight * dl) / length
-    second = (dot(w, tangent.u, du) + tangent.parameter * weight * dl) / length
+    second = (dot(w, t1.u, du) + t1.parameter * weight * dl) / length
     mean = math.sqrt(max(2 + 2 * cosine, 1e-30))
     chord = math.acos(max(-1.0, min(1.0, (first + second) / mean)))
-    motion = spectral_motion(last.spectrum.values, values, last.problem.critical.circle)
-    return Comparison(length, angle / ANGLE, chord / CHORD, motion / MOTION)
+    du, dl = new.u - guess[0], (new.parameter - guess[1]) * weight
+    missed = math.sqrt(dot(w, du, du) + dl * dl) / length
+    motion = spectral_motion(last.spectrum.values, new.spectrum.values, last.problem.critical.circle)
+    return Comparison(length, angle / ANGLE, chord / CHORD, missed / MISSED, motion / MOTION)
 
 
 def next_length(h: float, seen: Comparison, iterations: int, steps: Steps) -> float:

@@ -413,7 +413,7 @@ class Equilibrium:
         return dataclasses.replace(self, scales=np.where(sizes > 1e-12, np.abs(sizes), self.scales))
 
     def adapt(self, u: Array, params: Array, tangent: Tangent) -> tuple[Equilibrium, Array, Tangent] | None:
-        """New scales at the first call, and when a state has outgrown its own by a factor of two."""
+        """New scales at the first call, and when a state has outgrown its own by a factor of two (it is then doubled again)."""
         if not self.following:
             return None
         s = self.scales
@@ -424,7 +424,7 @@ class Equilibrium:
         elif (np.abs(u) <= 2 * s).all():
             return None
         else:
-            scales = np.maximum(np.abs(u), s)
+            scales = np.where(np.abs(u) > 2 * s, 2 * np.abs(u), s)
         problem = dataclasses.replace(self, scales=scales, fresh=False)
         length = math.sqrt(float(problem.weights @ tangent.u**2) + (tangent.parameter * tangent.weight) ** 2)
         return problem, u, Tangent(tangent.u / length, tangent.parameter / length, tangent.weight)
