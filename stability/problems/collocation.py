@@ -280,13 +280,13 @@ class Collocation(OrbitDiscretisation):
         work = Workspace(mesh, len(params), len(self.kept))
         work.T[:] = rest if mesh.own else 0.0
         stage, node = np.empty_like(stages), np.empty_like(nodes)
-        _, sigma = kernels.evaluate(
+        residual, sigma = kernels.evaluate(
             self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.update,
             self.closure, self.winding, self.scales, params, nodes, stages, work.T, work.F, work.J, work.Fp, work.dT,
             stage, node,
         )  # fmt: skip
         sign = 0.0
-        if np.isfinite(work.J).all():
+        if residual < np.inf and np.isfinite(work.J).all():
             empty = np.empty((mesh.intervals, mesh.degree * mesh.n, 0))
             sign = kernels.condense(
                 rule.inverse, rule.matrix, rule.row_sums, rule.update, mesh.h, sigma, work.J, self.kept, self.position,
