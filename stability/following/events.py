@@ -141,6 +141,7 @@ class Dip(NamedTuple):
     at: float
     depth: float  # value at the vertex over the second smallest of the three: negative where it crosses zero
     values: tuple[float, float, float]
+    width: float  # distance from the vertex at which the parabola has twice the smallest of the three values
 
 
 def vertex(at: tuple[float, float, float], values: tuple[float, float, float]) -> Dip | None:
@@ -156,7 +157,8 @@ def vertex(at: tuple[float, float, float], values: tuple[float, float, float]) -
     if not x0 < x < x2:
         return None
     value = y0 + first * (x - x0) + bend * (x - x0) * (x - x1)
-    return Dip(x, value / math.copysign(sorted((abs(y0), abs(y1), abs(y2)))[1], y1), values)
+    smallest, second, _ = sorted((abs(y0), abs(y1), abs(y2)))
+    return Dip(x, value / math.copysign(second, y1), values, math.sqrt(smallest / abs(bend)))
 
 
 def dip_of(points: tuple[Point, Point, Point], which: int) -> Dip | None:
@@ -170,8 +172,6 @@ def dip_of(points: tuple[Point, Point, Point], which: int) -> Dip | None:
     if which >= 0:
         return vertex(at, (_test(p, which), _test(q, which), _test(r, which)))
     growth = matched_growth(points)
-    if growth is None:
-        return None
     deepest = None
     size = np.abs(growth)
     for y0, y1, y2 in growth[:, (size[1] < size[0]) | (size[1] < size[2])].T.tolist():
@@ -185,14 +185,12 @@ def _test(p: Point, which: int) -> float:
     return p.tests[which] if which < 3 else p.tangent.parameter
 
 
-def matched_growth(points: tuple[Point, Point, Point]) -> NDArray[np.float64] | None:
-    """(3, n) growth Re(lambda), or log|mu|, of values matched to their nearest neighbours; None where they collide."""
+def matched_growth(points: tuple[Point, Point, Point]) -> NDArray[np.float64]:
+    """(3, k) growth Re(lambda), or log|mu|, of the values that have one nearest neighbour in both other spectra."""
     spectra = [p.spectrum.values for p in points]
     first, last = (np.abs(spectra[1][:, None] - spectra[k][None, :]).argmin(axis=1) for k in (0, 2))
-    n = spectra[1].size
-    if len(set(first.tolist())) < n or len(set(last.tolist())) < n:
-        return None
-    matched = np.array([spectra[0][first], spectra[1], spectra[2][last]])
+    alone = (np.bincount(first)[first] == 1) & (np.bincount(last)[last] == 1)
+    matched = np.array([spectra[0][first[alone]], spectra[1][alone], spectra[2][last[alone]]])
     if not points[0].problem.critical.circle:
         return matched.real
     with np.errstate(divide="ignore"):
@@ -205,4 +203,4 @@ def crossed(points: tuple[Point, Point, Point], which: int) -> bool:
         y0, y1, y2 = (_test(p, which) for p in points)
         return y0 * y1 < 0 and y1 * y2 < 0
     growth = matched_growth(points)
-    return growth is not None and bool(((growth[0] * growth[1] < 0) & (growth[1] * growth[2] < 0)).any())
+    return bool(((growth[0] * growth[1] < 0) & (growth[1] * growth[2] < 0)).any())

@@ -78,8 +78,8 @@ class Follower(Iterator[Point]):
         step = self._advance()
         if step is None:
             raise StopIteration
-        point, seen = step
-        self._take(point, seen)
+        point, seen, found = step
+        self._take(point, seen, found)
         if self.settings.progress is not None:
             found = sum(e.found is not None for e in self.entries)
             self.settings.progress(Progress(len(self.entries), point.parameter, self.length, found))
@@ -95,13 +95,20 @@ class Follower(Iterator[Point]):
         return self
 
     # ------------------------------------------------------------------ one step
-    def _advance(self) -> tuple[Point, Comparison] | None:
+    def _advance(self) -> tuple[Point, Comparison, list[Found]] | None:
         h = min(self.length, self.settings.steps.longest)
+        patience = 3
         while h >= self.settings.steps.shortest:
-            found = self._try(h)
-            if isinstance(found, tuple):
-                return found
-            h *= found
+            made = self._try(h)
+            if isinstance(made, float):
+                h *= made
+                continue
+            found, doubtful = self._bifurcations(self.last, made[0])
+            if not doubtful or patience == 0:
+                return *made, found
+            # a crossing was foretold and is not there: this point may be on another branch
+            patience -= 1
+            h = 0.3 * made[1].distance
         self.status = Status.STEP_TOO_SMALL
         return None
 
@@ -164,12 +171,13 @@ class Follower(Iterator[Point]):
         return point, seen
 
     # ------------------------------------------------------------------ after a step
-    def _take(self, point: Point, seen: Comparison) -> None:
+    def _take(self, point: Point, seen: Comparison, found: list[Found]) -> None:
         settings, last = self.settings, self.last
         closed = self.home.reached(last, point, self.locator, self.accepted)
         if closed is not None:
             point = closed
-        found = self._search(last, point)
+            found = [f for f in found if f.point.s <= closed.s]
+        found = self._with_wanted(last, point, found)
         if self._stops(found):
             return
         at_point = self._value_at(point)
@@ -249,15 +257,14 @@ class Follower(Iterator[Point]):
         self.entries[where] = Entry(new, self.entries[where].found)
 
     # ------------------------------------------------------------------ events of a segment
-    def _search(self, a: Point, b: Point) -> list[Found]:
-        """Everything special strictly between a and b (and, late, between the point before and a)."""
-        found = self._bifurcations(a, b)
+    def _with_wanted(self, a: Point, b: Point, found: list[Found]) -> list[Found]:
+        """Also the parameter values and zeros of user functions asked for, between a, the found points and b."""
         own = [f for f in found if f.point.s >= a.s]
         knots = [a, *(f.point for f in sorted(own, key=lambda f: f.point.s)), b]
         if self.settings.at:
-            found += self._values(knots)
+            found = found + self._values(knots)
         if self.settings.events:
-            found += self._user_events(knots)
+            found = found + self._user_events(knots)
         return sorted(found, key=lambda f: f.point.s)
 
     def _values(self, knots: list[Point]) -> list[Found]:
@@ -290,29 +297,35 @@ class Follower(Iterator[Point]):
                         found.append(Found(point, Kind.USER, (p.parameter, q.parameter), 0.0, name))
         return found
 
-    def _bifurcations(self, a: Point, b: Point) -> list[Found]:
-        """Events that the integers at a and b show, and in-and-out changes that they do not."""
+    def _bifurcations(self, a: Point, b: Point) -> tuple[list[Found], bool]:
+        """Events that the integers at a and b show, and in-and-out changes that they do not.
+
+        The flag tells that a crossing foretold by a parabola between a and b could not be found.
+        """
         p = self.before
         known = p is not None and p.problem is a.problem
         here, behind = [a, b], [p, a] if known else []
         x = double_turn(a, b)
-        cuts = [] if x is None else [(x, 3)]
+        cuts = [] if x is None else [(x, 3, 0.0)]
         if p is not None and known:
             for which in self._tests(b):
                 dip = dip_of((p, a, b), which)
                 if dip is not None and dip.depth < _DIP:
-                    cuts.append((dip.at, which))
-        for x, which in cuts:
+                    cuts.append((dip.at, which, dip.depth))
+        doubtful = False
+        for x, which, depth in cuts:
             knots = here if x > a.s else behind
             between = self._turning_point(knots[0], knots[-1], which, x)  # type: ignore[arg-type]
             if between is not None:
                 knots.append(between)
                 knots.sort(key=lambda q: q.s)  # type: ignore[union-attr]
+            elif depth < 0 and knots is here and len(here) == 2:
+                doubtful = True
         found: list[Found] = []
         for knots in (behind if len(behind) > 2 else [], here):
             for q, r in pairwise(knots):
                 found += self.locator.resolve(q, r)  # type: ignore[arg-type]
-        return [f for f in found if not self._known(f)]
+        return [f for f in found if not self._known(f)], doubtful and not found
 
     def _known(self, found: Found) -> bool:
         """Whether this event is among the entries already (a segment that is searched again)."""
@@ -356,14 +369,12 @@ class Follower(Iterator[Point]):
                 dip = dip_of(triple, which)
                 if dip is None:
                     return None
-            lowest, width = triple[1], triple[2].s - triple[0].s
-            x = dip.at
-            if abs(x - lowest.s) < 0.02 * width:
-                predicted = dip.depth * sorted(map(abs, dip.values))[1]
-                if predicted > 0.95 * abs(dip.values[1]) and width < 0.3 * (b.s - a.s):
-                    return None  # the minimum is sampled, and it is not zero
+            lowest, x = triple[1], dip.at
+            if abs(x - lowest.s) < 0.1 * dip.width:
+                if triple[2].s - triple[0].s < 8 * dip.width:
+                    return None  # the minimum is sampled closely, and it is not zero
                 side = 1 if triple[2].s - lowest.s > lowest.s - triple[0].s else -1
-                x = lowest.s + side * 0.1 * width
+                x = lowest.s + side * 2 * dip.width
         return None
 
     def _inside(self, a: Point, b: Point, s: float) -> Point | None:
