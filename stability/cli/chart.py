@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..results.chart import StabilityChart
 
 PICTURES = (".png", ".svg", ".pdf")
+_LEAVES = {"+1": "mu = +1", "-1": "mu = -1", "pair": "complex pair"}
 FORMATS = (*PICTURES, ".npz", ".csv")
 
 # axes that show the tongues of models that are usually asked for without any
@@ -126,7 +127,7 @@ def _document(
         "shares": shares,
         "largest_growth_rate": float(np.nanmax(computed.growth_rate)),
         "error": float(np.nanmax(computed.error)),
-        "tips": [{"order": tip.order, x[0]: tip.x, y[0]: tip.y} for tip in computed.tips],
+        "tips": [{"order": tip.order, "kind": tip.kind, x[0]: tip.x, y[0]: tip.y} for tip in computed.tips],
         "boundaries": traced[0],
         "seconds": {"points": painted, "boundaries": traced[1]},
         "written": [str(path) for path in outputs],
@@ -147,8 +148,9 @@ def _report(console: Console, document: dict[str, Any], computed: StabilityChart
         *((word, f"{share:.2%} of the points") for word, share in document["shares"].items()),
     ]
     for tip in document["tips"]:
-        rows.append((f"tongue {tip['order']} opens", f"at {x['parameter']} = {tip[x['parameter']]:.10g}, "
-                                                     f"{y['parameter']} = {tip[y['parameter']]:.10g}"))
+        name = "tongue" if tip["order"] is None else f"tongue {tip['order']}"
+        place = ", ".join(f"{axis['parameter']} = {tip[axis['parameter']]:.10g}" for axis in (x, y))
+        rows.append((f"{name} opens ({_LEAVES[tip['kind']]})", f"at {place}"))
     console.table(rows)
     for path in document["written"]:
         console.say(f"wrote {path}")

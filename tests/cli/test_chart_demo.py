@@ -17,7 +17,7 @@ from stability.cli import main
 from stability.cli.demos import SECTIONS
 
 ROOT = Path(__file__).resolve().parents[2]
-SMALL = ["--set", "delta=0.05", "--x", "a:-0.5:2.5", "--y", "b:0:2", "--shape", "40x30"]
+SMALL = ["--set", "delta=0.05", "--x", "a:0:0.6", "--y", "b:0:0.4", "--shape", "40x30"]
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture(scope="module")
 def reference() -> st.results.chart.StabilityChart:  # type: ignore[name-defined]
-    return st.chart(st.models.mathieu(delta=0.05), x=("a", -0.5, 2.5), y=("b", 0, 2), shape=(40, 30))
+    return st.chart(st.models.mathieu(delta=0.05), x=("a", 0, 0.6), y=("b", 0, 0.4), shape=(40, 30))
 
 
 @pytest.mark.parametrize(
@@ -68,7 +68,7 @@ def test_json(folder: Path, capsys: pytest.CaptureFixture[str], reference: objec
     assert main(["chart", "mathieu", *SMALL, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["shape"] == [40, 30] and document["set"] == {"delta": 0.05} and document["written"] == []
-    assert document["tips"] == [{"order": t.order, "a": t.x, "b": t.y} for t in reference.tips]  # type: ignore[attr-defined]
+    assert document["tips"] == [{"order": t.order, "kind": t.kind, "a": t.x, "b": t.y} for t in reference.tips]  # type: ignore[attr-defined]
     assert abs(sum(document["shares"].values()) - 1) < 1e-12
     assert not list(folder.iterdir())
 
@@ -99,7 +99,7 @@ def test_summary_names_the_tips(capsys: pytest.CaptureFixture[str], reference: o
     assert main(["chart", "mathieu", *SMALL]) == 0
     text = capsys.readouterr().out
     for tip in reference.tips:  # type: ignore[attr-defined]
-        assert f"tongue {tip.order} opens" in text and f"{tip.y:.10g}" in text
+        assert f"tongue {tip.order} opens (mu = {tip.kind})" in text and f"{tip.y:.10g}" in text
 
 
 def test_equilibrium_by_name(capsys: pytest.CaptureFixture[str]) -> None:
