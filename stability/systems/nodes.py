@@ -37,6 +37,7 @@ MAX_BITS = 1024  # of the numerator and of the denominator of an exact number: t
 MAX_EXPONENT = 4096  # of a power after sympy has merged powers of powers
 MAX_ALTERNATIVES = 16  # arguments of one max, min or piecewise
 MAX_CONSTANT = 16  # nodes of a constant that stays exact; a larger one becomes a double
+MAX_TERMS = 100  # of the argument of a hyperbolic function, multiplied out: sympy does so where it may be complex
 MAX_POWERS = 16  # powers and quotients inside one another: sympy's questions about signs go through all of them
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
@@ -156,6 +157,18 @@ def _construct(kind: NodeKind, args: Sequence[sp.Basic], constants: Sequence[Any
     return kind.cls(*args)
 
 
+def _terms(node: sp.Basic) -> float:
+    """A bound for the number of terms of `node` and of all that is in it, multiplied out."""
+    inside = [_terms(arg) for arg in node.args]
+    if isinstance(node, sp.Add):
+        return sum(inside)
+    if isinstance(node, sp.Mul):
+        return math.prod(inside)
+    if isinstance(node, sp.Pow) and isinstance(node.exp, sp.Rational) and inside[0] > 1:
+        return min(inside[0], 1e6) ** min(abs(float(node.exp)) + 1, 40.0)
+    return max(inside, default=1.0)
+
+
 def _by_order(kind: NodeKind, args: Sequence[sp.Basic], constants: Sequence[Any]) -> sp.Basic:
     return args[constants.index(kind.value(*constants))]
 
@@ -214,7 +227,12 @@ class Builder:
             value = _finite(kind, constants)
             if sum(self.sizes.get(arg, 1) for arg in args) > MAX_CONSTANT and not isinstance(value, bool):
                 return sp.Float(value)
-        node = _construct(kind, args, constants)
+        if name in ("sinh", "cosh", "tanh") and _terms(args[0]) > MAX_TERMS and not args[0].is_extended_real:
+            raise ExpressionError(f"the argument of '{name}' has too many terms multiplied out, and may be complex")
+        try:
+            node = _construct(kind, args, constants)
+        except RecursionError:
+            raise ExpressionError(f"the argument of '{name}' is too involved for sympy") from None
         self.value(node)
         return node
 

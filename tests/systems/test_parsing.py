@@ -196,6 +196,7 @@ _SIZE = [
     "x" * 65, "x" * 4097, " " * 4097, "x+" * 1400 + "x", "1*" * 1500 + "1", "max(" + ",".join(f"x+{i}" for i in range(17)) + ")",
     "+".join(f"max(x+{i},y,sin(x+{i}))" for i in range(190)), "((" * 29 + "x" + "+1)**3)" * 29, "1/(x+" * 40 + "x" + ")" * 40,
     "max(" * 20 + "x" + "".join(f",y+{i})" for i in range(20)), "sin(" * 61 + "x" + ")" * 61, "where(" * 61, "not " * 500 + "x",
+    "cos(sinh((acosh(where(mod(x,y)/x - x > pi + 1.5, atan2(y - k, 0.3*7), y - x)) + atan2(mod(7,2) + y, k)/1.5 + k)**64))",
     "where(" + "not " * 1000 + "x > 0, 1, 2)", "where(" + "x < " * 1000 + "x, 1, 2)",
 ]  # fmt: skip
 _LOOKALIKES = [
