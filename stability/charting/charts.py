@@ -13,15 +13,12 @@ practice (2013).
 
 from __future__ import annotations
 
-import math
-import os
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, ResourceLimitError, check_names
+from ..errors import InputError, check_names
 from ..floquet.linearisation import linearise
 from ..floquet.structure import blocks, structure
 from ..results.categories import KINDS, VERDICTS, Categories
@@ -31,6 +28,7 @@ from .boundaries import Tracer
 from .painting import Picture, combine, paint, worst_error
 from .sampling import Sampler
 from .tensors import build_tiles
+from .windows import axis, grid_shape, sampled_window
 
 if TYPE_CHECKING:
     from ..systems.system import System
@@ -38,7 +36,6 @@ if TYPE_CHECKING:
 __all__ = ["chart"]
 
 Array = NDArray[np.float64]
-_BYTES = 10  # per point: growth rate, verdict, kind
 
 
 def chart(
@@ -96,15 +93,15 @@ def chart(
     >>> tongues.growth_rate.shape, bool((tongues.verdict == st.Verdict.UNSTABLE)[-1, 30])
     ((40, 60), True)
     """
-    x_name, x_lo, x_hi = _axis("x", x, system)
-    y_name, y_lo, y_hi = _axis("y", y, system)
+    x_name, x_lo, x_hi = axis("x", x, system)
+    y_name, y_lo, y_hi = axis("y", y, system)
     if x_name == y_name:
         raise InputError(f"x and y are both '{x_name}'; a chart needs two different parameters")
     check_names("parameter", params, system.parameters)
     taken = [n for n in params if n in (x_name, y_name)]
     if taken:
         raise InputError(f"'{taken[0]}' is an axis of the chart; it cannot also be given a value")
-    nx, ny = _shape(shape)
+    nx, ny = grid_shape(shape)
     if not (isinstance(tolerance, int | float) and 1e-13 <= tolerance <= 1e-2):
         raise InputError(f"tolerance = {tolerance!r}; the allowed range is 1e-13 to 1e-2")
     low = system.parameter_vector(**params, **{x_name: x_lo, y_name: y_lo})
@@ -112,7 +109,7 @@ def chart(
     linear = linearise(system, about)
     names = list(system.parameters)
     corners = np.array([low, high])
-    window = (x_lo, x_hi, y_lo, y_hi)
+    window = sampled_window(linear, low, (names.index(x_name), names.index(y_name)), (x_lo, x_hi, y_lo, y_hi))
     grid_x, grid_y = np.linspace(x_lo, x_hi, nx), np.linspace(y_lo, y_hi, ny)
     samplers, layers = [], []
     picture: Picture | None = None
@@ -139,41 +136,3 @@ def _layer(sampler: Sampler, tolerance: float) -> Layer:
     tiles = build_tiles(sampler, sampler.window, tolerance, lambda tile: worst_error(tile, form, tolerance))
     neutral = found.trace_free and (n == 2 or sampler.is_reciprocal)
     return Layer(form, n, neutral, tiles)
-
-
-def _axis(which: str, given: Any, system: System) -> tuple[str, float, float]:
-    """A checked (name, lo, hi)."""
-    if isinstance(given, str) or not isinstance(given, Sequence) or len(given) != 3:
-        raise InputError(f"{which} = {given!r}; give (name, lo, hi), for instance {which}=('a', 0.0, 2.0)")
-    name, lo, hi = given
-    check_names("parameter", [name], system.parameters)
-    try:
-        lo, hi = float(lo), float(hi)
-    except (TypeError, ValueError):
-        raise InputError(f"the interval of {which} = '{name}' must be two numbers; got {lo!r}, {hi!r}") from None
-    if not (math.isfinite(lo) and math.isfinite(hi)):
-        raise InputError(f"the interval of {which} = '{name}' must be finite; got {lo}, {hi}")
-    if not lo < hi:
-        raise InputError(f"the interval of {which} = '{name}' must have lo < hi; got {lo:g}, {hi:g}")
-    return str(name), lo, hi
-
-
-def _shape(shape: Any) -> tuple[int, int]:
-    """(nx, ny), at least 2 each, that fit into half of the machine's memory."""
-    pair = (shape, shape) if isinstance(shape, int | np.integer) else shape
-    try:
-        nx, ny = (int(n) for n in pair)
-        exact = all(n == m for n, m in zip((nx, ny), pair, strict=True))
-    except (TypeError, ValueError):
-        exact = False
-    if not exact:
-        raise InputError(f"shape = {shape!r}; give two whole numbers (nx, ny)")
-    if nx < 2 or ny < 2:
-        raise InputError(f"shape = {shape!r}; at least 2 points along each axis are needed")
-    limit = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") // 2 if hasattr(os, "sysconf") else 2**33
-    if nx * ny * _BYTES > limit:
-        raise ResourceLimitError(
-            f"a chart of {nx} x {ny} points needs {nx * ny * _BYTES / 2**30:.1f} GiB; at most {limit / 2**30:.1f} GiB "
-            "are used: make shape smaller, or chart several windows"
-        )
-    return nx, ny

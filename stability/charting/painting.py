@@ -56,14 +56,13 @@ def paint(tiles: tuple[Tile, ...], form: str, neutral: bool, x: Array, y: Array,
     growth, verdict, kind = np.empty(shape), np.empty(shape, np.int8), np.empty(shape, np.int8)
     error = 0.0
     right, top = max(t.box[1] for t in tiles), max(t.box[3] for t in tiles)
+    left, bottom = min(t.box[0] for t in tiles), min(t.box[2] for t in tiles)
     for tile in tiles:
         x0, x1, y0, y1 = tile.box
         columns = slice(*np.searchsorted(x, [x0, x1], side="left"))
         rows = slice(*np.searchsorted(y, [y0, y1], side="left"))
-        if x1 == right:
-            columns = slice(columns.start, len(x))
-        if y1 == top:
-            rows = slice(rows.start, len(y))
+        columns = slice(0 if x0 == left else columns.start, len(x) if x1 == right else columns.stop)
+        rows = slice(0 if y0 == bottom else rows.start, len(y) if y1 == top else rows.stop)
         if columns.start >= columns.stop or rows.start >= rows.stop:
             continue
         into = growth[rows, columns], verdict[rows, columns], kind[rows, columns]
@@ -137,10 +136,12 @@ def _two_states(
     np.arcsinh(growth, out=growth)
     growth *= factor * chi
     growth += sigma
-    near = min(0.25, max((0.5 * factor * bound * chi_top / tolerance) ** 2, 4.0 * bound))
+    near = max((0.5 * factor * bound * chi_top / tolerance) ** 2, 4.0 * bound)
     error = 0.5 * factor * chi_top * bound / np.sqrt(near * (1.0 + near))
-    if bulk_only:
-        return error
+    if bulk_only or near > 0.25:  # the bound for the block is too coarse: look at every point
+        error, close = 0.0, np.arange(s.size)
+    else:
+        close = np.flatnonzero(np.abs(s) < near)
     over, under = verdict.view(bool), kind.view(bool)
     if neutral:
         np.greater(s, bound, out=over)
@@ -149,14 +150,14 @@ def _two_states(
         np.greater(growth, error, out=over)
         np.greater_equal(growth, -error, out=under)
     _encode(verdict, kind, neutral)
-    close = np.flatnonzero(np.abs(s) < near) if s.flags.c_contiguous else np.flatnonzero(np.abs(s).ravel() < near)
     if close.size:
         rows, columns = np.unravel_index(close, s.shape)
         here, ds = s[rows, columns], uncertain(rows, columns)
         upper = np.arcsinh(np.sqrt(np.maximum(here + ds, 0.0)))
         lower = np.arcsinh(np.sqrt(np.maximum(here - ds, 0.0)))
-        scale = factor * np.broadcast_to(chi, s.shape)[rows, columns]
-        each = scale * (upper - lower)
+        each = factor * np.broadcast_to(chi, s.shape)[rows, columns] * (upper - lower)
+        if bulk_only:  # edges are nowhere better than their square root allows, however small the tile
+            return float(np.where(np.abs(here) > 1e-2, each, 0.0).max())
         if neutral:
             codes = np.where(here > ds, UNSTABLE, np.where(here < -ds, NEUTRAL, UNDETERMINED))
         else:

@@ -25,7 +25,7 @@ __all__ = ["build_tiles"]
 Array = NDArray[np.float64]
 
 _FIRST, _LARGEST = 16, 64
-_MAX_TILES = 1024
+_MAX_TILES = 400
 _MAX_STEPS = 8192
 
 

@@ -26,7 +26,7 @@ chapter 1 (semi-trivial solutions).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -64,6 +64,7 @@ class PeriodicLinear:
     evaluator: Any
     columns: bool = False
     rows: tuple[int, ...] | None = None
+    _motions: dict[bytes, Motion | None] = field(default_factory=dict, repr=False)
 
     @property
     def n(self) -> int:
@@ -106,12 +107,18 @@ class PeriodicLinear:
     def motion(self, P: Any) -> Motion | None:
         """The solution x*(phase) at parameters (N, m), checked; None stands for x* = 0."""
         P = _nodes(P)
-        if self.about is None:
-            self._check_zero(P)
-            return None
-        motion = _motion(self, self.about, P)
-        self._check(motion, P)
-        return motion
+        key = P.tobytes()
+        if key not in self._motions:
+            motion = None
+            if self.about is None:
+                self._check_zero(P)
+            else:
+                motion = _motion(self, self.about, P)
+                self._check(motion, P)
+            while len(self._motions) >= 8:  # the same nodes come back several times in a row
+                self._motions.pop(next(iter(self._motions)))
+            self._motions[key] = motion
+        return self._motions[key]
 
     def bind(self, P: Any) -> Callable[[Array], Array]:
         """``phases (K,) or (K, N) -> A (K, N, n, n)`` at fixed parameters: x* is found and checked once, here."""

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, InputError
+from ..errors import ConvergenceError, InputError, NonFiniteError
 
 __all__ = ["Motion", "constant_motion", "linear_response", "orbit_motion"]
 
@@ -116,6 +116,11 @@ def _sampled(field: Any, states: Array, P: Array) -> tuple[Array, Array]:
     """f (K, N, n) and df/dx (K, N, n, n) at equal phases and constant states (N, n)."""
     phases = np.repeat(np.arange(_SAMPLES) / _SAMPLES, len(P))
     F, J = field.FJ(phases, np.tile(states, (_SAMPLES, 1)), np.tile(P, (_SAMPLES, 1)))
+    if not (np.isfinite(F).all() and np.isfinite(J).all()):
+        raise NonFiniteError(
+            "the equations are not finite at a state on the way to the equilibrium; restrict the range of parameters, "
+            "or give about=dict(<state>=<value>) near it"
+        )
     return F.reshape(_SAMPLES, *states.shape), J.reshape(_SAMPLES, *states.shape, field.n)
 
 

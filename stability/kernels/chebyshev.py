@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 __all__ = ["at_points", "basis", "basis_derivative", "chop", "coefficients", "lobatto", "tails"]
 
 Array = NDArray[np.float64]
+_MARGIN = 1e-3  # extrapolation beyond the box, used where an edge of a window cannot be sampled itself
 
 
 def lobatto(degree: int) -> Array:
@@ -31,18 +32,23 @@ def lobatto(degree: int) -> Array:
 
 
 def basis(xi: Array, degree: int) -> Array:
-    """T_0 .. T_degree at the points xi: (degree + 1, points), by cos(k arccos xi) with xi clipped to [-1, 1].
+    """T_0 .. T_degree at the points xi: (degree + 1, points), by cos(k arccos xi); a little outside [-1, 1] by cosh.
 
     >>> basis(np.array([0.5]), 2)[:, 0].round(12).tolist()
     [1.0, 0.5, -0.5]
     """
-    angle = np.arccos(np.clip(xi, -1.0, 1.0))
-    return np.asarray(np.cos(np.arange(degree + 1)[:, None] * angle))
+    k = np.arange(degree + 1)[:, None]
+    values = np.asarray(np.cos(k * np.arccos(np.clip(xi, -1.0, 1.0))))
+    beyond = np.abs(xi) > 1.0 + 1e-15
+    if np.any(beyond):
+        far = np.minimum(np.abs(xi[beyond]), 1.0 + _MARGIN)
+        values[:, beyond] = np.sign(xi[beyond]) ** k * np.cosh(k * np.arccosh(far))
+    return values
 
 
 def basis_derivative(xi: Array, degree: int) -> Array:
     """dT_k/dxi = k U_{k-1}(xi), by the recurrence U_{k+1} = 2 xi U_k - U_{k-1}: (degree + 1, points)."""
-    xi = np.clip(xi, -1.0, 1.0)
+    xi = np.clip(xi, -1.0 - _MARGIN, 1.0 + _MARGIN)
     out = np.zeros((degree + 1, xi.size))
     before, now = np.zeros_like(xi), np.ones_like(xi)
     for k in range(1, degree + 1):
