@@ -13,7 +13,7 @@ for a branch needs a path:
   as zero.
 * At a double point itself the eigenvalue is defective: a rounding of ``q`` moves it by the square root of that
   rounding, and about eight digits are meaningful. Where the estimated error (condition number times rounding) passes
-  1e-6 of ``max(|a|, |q|, 1)``, a `ConvergenceError` is raised instead of a number.
+  1e-6 of ``max(|a|, |q|, 1)``, or where roundings on the way reach the next branch, a `ConvergenceError` is raised.
 
 Reference: C. Hunter, B. Guerrieri, Stud. Appl. Math. 64 (1981) 113-141 (branch points); DLMF 28.7.
 """
@@ -32,6 +32,7 @@ MAX_COMPLEX_Q = 500.0
 _TILT = 1e-3  # rad; the path to an imaginary q runs this far from the axis, then turns onto it
 _FIRST_STEP, _LEAST_STEP = 1 / 32, 1e-11
 _SURE = 0.2  # a match is accepted when the second nearest eigenvalue is five times as far away
+_ROUNDING = 4.0 * float(np.finfo(float).eps)
 _WORST = 1e-6  # largest estimated relative error that is still returned
 
 Complex = NDArray[np.complex128]
@@ -45,7 +46,7 @@ def continued_values(order: NDArray[np.int64], q: Complex, odd: bool) -> Complex
     InputError
         ``|q|`` above 500.
     ConvergenceError
-        A double point on the ray, or an eigenvalue too ill-conditioned for double precision.
+        A double point on the ray, or an eigenvalue too ill-conditioned for double precision, at `q` or on the way.
     """
     if np.any(np.abs(q) > MAX_COMPLEX_Q):
         worst = q.flat[np.argmax(np.abs(q))]
@@ -91,18 +92,21 @@ def _continued_value(n: int, q: complex, odd: bool) -> complex:
     value, s, step = complex(n * n), 0.0, _FIRST_STEP
     while s < 1.0:
         target = min(1.0, s + step)
-        spectrum = np.linalg.eigvals(_matrix(n, _path(q, target), odd, first, rows))
+        spectrum, vectors = np.linalg.eig(_matrix(n, _path(q, target), odd, first, rows))
         distance = np.abs(spectrum - value)
         nearest, second = np.argsort(distance)[:2]
+        gap = abs(spectrum[second] - spectrum[nearest])
+        rounding = _condition(vectors[:, nearest]) * _ROUNDING * max(abs(value), size, 1.0)
         at_end = target == 1.0 and step <= 1e-8  # a double point at q itself: both candidates are its value
-        if distance[nearest] <= _SURE * distance[second] or at_end:
+        sure = distance[nearest] <= _SURE * distance[second] and rounding <= _SURE * gap
+        if sure or at_end:
             value, s, step = complex(spectrum[nearest]), target, min(1.6 * step, 0.1)
             continue
         step *= 0.5
         if step < _LEAST_STEP:
             raise ConvergenceError(
-                f"order {n} cannot be followed to q = {q}: the ray meets a double point near q = {_path(q, s):.9g}; "
-                "choose a q off this ray",
+                f"order {n} cannot be followed to q = {q}: at q = {_path(q, s):.9g} it meets another order, or "
+                "roundings reach the next one; choose a q off this ray, or a smaller one",
                 last_q=_path(q, s),
                 last_value=value,
             )
@@ -115,11 +119,10 @@ def _polished(n: int, q: complex, odd: bool, value: complex, matrix: Complex) ->
     at = int(np.argmin(np.abs(spectrum - value)))
     vector = vectors[:, at]
     weight = np.sum(vector * vector)
-    condition = float(np.sum(np.abs(vector) ** 2) / max(abs(weight), 1e-300))
+    condition = _condition(vector)
     scale = max(abs(value), abs(q), 1.0)
-    rounding = 4.0 * np.finfo(float).eps
     # at a simple double point the error saturates at the square root
-    error = min(condition * rounding, np.sqrt(_growth(spectrum, at, scale) * rounding))
+    error = min(condition * _ROUNDING, np.sqrt(_growth(spectrum, at, scale) * _ROUNDING))
     if error > _WORST:
         raise ConvergenceError(
             f"{'b' if odd else 'a'}_{n} at q = {q} has condition number {condition:.1e}: only about "
@@ -130,6 +133,11 @@ def _polished(n: int, q: complex, odd: bool, value: complex, matrix: Complex) ->
     if condition > 1e4:
         return value
     return complex(np.sum(vector * (matrix @ vector)) / weight)
+
+
+def _condition(vector: Complex) -> float:
+    """Condition number ``|v|^2 / |v^T v|`` of a simple eigenvalue of a complex symmetric matrix."""
+    return float(np.sum(np.abs(vector) ** 2) / max(abs(np.sum(vector * vector)), 1e-300))
 
 
 def _growth(spectrum: Complex, at: int, scale: float) -> float:
