@@ -51,7 +51,8 @@ def _same(p: Point, q: Point) -> bool:
 
 def _labelled(settings: Settings, entries: list[Entry]) -> tuple[list[SpecialPoint], list[int]]:
     counts: dict[Kind, int] = {}
-    special, marks = [], []
+    special: list[SpecialPoint] = []
+    marks: list[int] = []
     for entry in entries:
         found = entry.found
         if found is None:

@@ -81,8 +81,8 @@ class Follower(Iterator[Point]):
         point, seen, found = step
         self._take(point, seen, found)
         if self.settings.progress is not None:
-            found = sum(e.found is not None for e in self.entries)
-            self.settings.progress(Progress(len(self.entries), point.parameter, self.length, found))
+            events = sum(e.found is not None for e in self.entries)
+            self.settings.progress(Progress(len(self.entries), point.parameter, self.length, events))
         return point
 
     def run(self) -> Follower:

@@ -310,6 +310,7 @@ class Branch:
     def to_storage(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """Header and arrays for `results.storage.write`."""
         points = [p.to_storage() for p in self.special]
+        names = [n for n in self.columns if n not in (self.name, "arclength", "residual")]
         header = {
             "name": self.name,
             "window": list(self.window),
@@ -319,13 +320,13 @@ class Branch:
             "method": dict(self.method),
             "meshes": [dict(m if isinstance(m, Mapping) else m.spec) for m in self.meshes],
             "special": [p[0] for p in points],
-            "columns": [n for n in self.columns if n not in (self.name, "arclength", "residual")],
+            "columns": names,
         }
         sizes = [u.size for u in self.unknowns]
         arrays = {key: getattr(self, key) for key in (*_PER_POINT, "mesh_of")}
         arrays |= {"sizes": np.array(sizes), "unknowns": np.concatenate(self.unknowns)}
         arrays |= {"tangents": np.concatenate(self.tangents), "error": self.error}
-        arrays |= {f"column.{k}": self.columns[n] for k, n in enumerate(header["columns"])}  # type: ignore[arg-type]
+        arrays |= {f"column.{k}": self.columns[n] for k, n in enumerate(names)}
         arrays |= {f"special.{k}.{n}": a for k, p in enumerate(points) for n, a in p[1].items()}
         return header, arrays
 

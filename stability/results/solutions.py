@@ -230,7 +230,7 @@ class PeriodicOrbit:
         s = 2 * (local - self.edges[piece]) / width - 1
         c = self.coefficients
         if derivative:
-            c = np.polynomial.chebyshev.chebder(c, axis=1)
+            c = np.asarray(np.polynomial.chebyshev.chebder(c, axis=1), dtype=np.float64)
         basis = np.polynomial.chebyshev.chebvander(s, c.shape[1] - 1)
         values = np.einsum("ki,kin->kn", basis, c[piece])
         return values * (2 / width)[:, None] if derivative else values
@@ -278,7 +278,7 @@ class PeriodicOrbit:
         s, w = np.polynomial.legendre.leggauss(count)
         times = self.edges[:-1, None] + np.diff(self.edges)[:, None] * (0.5 + 0.5 * s)
         weights = (np.diff(self.edges)[:, None] * (0.5 * w)).ravel() / self.period
-        values = self._values(times.ravel()) - times.ravel()[:, None] / self.period * self.winding
+        values = self._values(times.ravel()) - times.ravel()[:, None] / self.period * np.asarray(self.winding)
         return (weights * np.exp(-2j * np.pi * k * times.ravel() / self.period)) @ values
 
     def amplitude(self, k: int = 1) -> Mapping[str, float]:

@@ -119,7 +119,7 @@ class SpecialPoint:
             raise FileFormatError(f"a special point's solution is of unknown type {stored.get('type')!r}")
         inner = {k.removeprefix("solution."): a for k, a in arrays.items() if k.startswith("solution.")}
         solution = _SOLUTIONS[stored["type"]].from_storage(stored, inner)
-        own = {k: arrays[k] for k in ("multipliers", "u", "direction")}
+        own: dict[str, Any] = {k: arrays[k] for k in ("multipliers", "u", "direction")}
         return cls(solution=solution, **own, **fields)
 
     def save(self, path: Any) -> None:

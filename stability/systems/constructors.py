@@ -72,7 +72,7 @@ class Constructors:
         """
         from .equations import system_fields
 
-        common = {
+        common: dict[str, Any] = {
             "name": name, "angles": angles, "orders": orders, "base": base, "stops": stops,
             "description": description, "units": units, "bounds": bounds,
         }  # fmt: skip
@@ -196,7 +196,7 @@ class Constructors:
         """
         from .functions import function_fields
 
-        common = {"angles": angles, "bounds": bounds, "units": units, "description": description, "breaks": breaks}
+        common: dict[str, Any] = {"angles": angles, "bounds": bounds, "units": units, "description": description, "breaks": breaks}
         return cls(**function_fields(function, states, period, parameters, name, **common))
 
     @classmethod
