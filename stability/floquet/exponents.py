@@ -69,7 +69,8 @@ def mathieu_exponent(a: ArrayLike, q: ArrayLike) -> Any:
     Notes
     -----
     *Accuracy*: absolute error below 1e-12 against 30-digit values for ``|a|, |q| <= 1e4``, also 1e-9 from a tongue
-    edge (the arguments are taken as exact doubles). In the exponentially thin bands of large q the value is that of
+    edge (the arguments are
+    taken as exact doubles); complex arguments 1e-9, controlled by the Wronskian. In the exponentially thin bands of large q the value is that of
     arguments moved by 1e-30 relative. Reference: DLMF 28.2(iii), 28.29.
 
     Examples
