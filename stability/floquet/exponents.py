@@ -68,9 +68,9 @@ def mathieu_exponent(a: ArrayLike, q: ArrayLike) -> Any:
 
     Notes
     -----
-    *Accuracy*: absolute error below 1e-12 against 30-digit values for ``|a|, |q| <= 1e4``, also 1e-9 from a tongue
-    edge (the arguments are
-    taken as exact doubles); complex arguments 1e-9, controlled by the Wronskian. In the exponentially thin bands of large q the value is that of
+    *Accuracy*: absolute error below 1e-12 against 30-digit values for ``|a| <= 1e4, |q| <= 4900``, also 1e-9 and 1e-12
+    from tongue edges (the arguments are taken as exact doubles); up to q = 1e6 by independent truncations. Complex
+    arguments: 1e-9, controlled by the Wronskian. In the exponentially thin bands of large q the value is that of
     arguments moved by 1e-30 relative. Reference: DLMF 28.2(iii), 28.29.
 
     Examples
