@@ -239,7 +239,9 @@ def _sides(seed: Seed, settings: Settings) -> tuple[Point, tuple[Follower | None
         raise InputError(f"the branch is born at {settings.name} = {at:.10g}, outside the window {window}")
     size = math.sqrt(dot(w, seed.tangent, seed.tangent) + (seed.parameter * weight) ** 2)
     tangent = Tangent(seed.tangent / size, seed.parameter / size, weight)
-    spectrum = problem.spectrum(problem.linearise(seed.u, params))
+    # an orbit born at a Hopf point has no direction of flow at its birth: its spectrum is taken just beside it
+    beside = seed.u if seed.sides == 2 else seed.u + 1e-4 * tangent.u
+    spectrum = problem.spectrum(problem.linearise(beside, params))
     tests = smooth_tests(spectrum.values, problem.critical.circle)
     birth = Point(problem, seed.u, params, at, tangent, spectrum, tests, 0, 0.0, 0, 0.0, 0.0)
     ahead = _first_step(seed, birth, settings, 1.0)

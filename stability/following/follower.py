@@ -31,8 +31,9 @@ __all__ = ["Entry", "Follower"]
 Array = NDArray[np.float64]
 _ADAPT_EVERY = 3
 _GROWTH = 1e6
-_STALL_POINTS, _STALL = 150, 1e-10
+_STALL_POINTS, _STALL, _STALL_LENGTH = 30, 1e-8, 0.05
 _DIP = 0.15
+_PATIENCE = 8
 
 
 class Entry(NamedTuple):
@@ -61,7 +62,7 @@ class Follower(Iterator[Point]):
         self.locator = Locator(settings.name, settings.index, settings.tolerance, settings.steps.shortest)
         self._growth = 1.0
         self._norm = self._norm_of(first)
-        self._extent: list[float] = []
+        self._extent: list[tuple[float, float]] = []
         self._event_values = [f(first.problem.view(first.u, first.params)) for _, f in settings.events]
         self._seen: dict[str, int] = {}
 
@@ -97,17 +98,17 @@ class Follower(Iterator[Point]):
     # ------------------------------------------------------------------ one step
     def _advance(self) -> tuple[Point, Comparison, list[Found]] | None:
         h = min(self.length, self.settings.steps.longest)
-        patience = 3
+        doubts = 0
         while h >= self.settings.steps.shortest:
             made = self._try(h)
             if isinstance(made, float):
                 h *= made
                 continue
             found, doubtful = self._bifurcations(self.last, made[0])
-            if not doubtful or patience == 0:
+            if not doubtful or doubts >= _PATIENCE or (doubts and not self._hopped(self.last, made[0])):
                 return *made, found
-            # a crossing was foretold and is not there: this point may be on another branch
-            patience -= 1
+            # a crossing was foretold and is not there: this point may lie on another branch
+            doubts += 1
             h = 0.3 * made[1].distance
         self.status = Status.STEP_TOO_SMALL
         return None
@@ -184,7 +185,7 @@ class Follower(Iterator[Point]):
         self.entries.append(Entry(point, at_point))
         self.special += at_point is not None
         self.accepted += 1
-        self.length = next_length(seen.distance, seen, point.iterations, settings.steps)
+        self.length = next_length(seen.distance, seen, last, point, settings.steps)
         if at_point is not None and self._named_stop(at_point):
             self.status = Status.STOPPED
         elif closed is not None:
@@ -224,11 +225,15 @@ class Follower(Iterator[Point]):
 
     def _runaway(self, point: Point) -> bool:
         size = self._norm_of(point)
-        self._extent.append(point.parameter)
+        self._extent.append((point.s, point.parameter))
         if not math.isfinite(size) or self._growth * size > _GROWTH * max(1.0, self._norm):
             return True
+        # a family that stands still in the parameter: a homoclinic orbit whose period grows, a vertical branch
         recent = self._extent[-_STALL_POINTS:]
-        return len(recent) == _STALL_POINTS and max(recent) - min(recent) < _STALL / self.settings.weight
+        values = [parameter for _, parameter in recent]
+        travelled = recent[-1][0] - recent[0][0]
+        still = max(values) - min(values) < _STALL / self.settings.weight
+        return len(recent) == _STALL_POINTS and still and travelled > _STALL_LENGTH
 
     @staticmethod
     def _norm_of(point: Point) -> float:
@@ -336,6 +341,10 @@ class Follower(Iterator[Point]):
             if same and abs(entry.point.s - found.point.s) < 1e-6:
                 return True
         return False
+
+    def _hopped(self, a: Point, b: Point) -> bool:
+        """Whether a branch point lies between a and b though the determinant kept its sign: b is on another branch."""
+        return self.locator.attempt(Kind.BRANCH_POINT, a, b) is not None
 
     @staticmethod
     def _tests(b: Point) -> list[int]:

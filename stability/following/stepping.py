@@ -12,8 +12,9 @@ corrected orthogonally to t_0. The new point z_1 with tangent t_1 is accepted if
     |z_1 - z| <= MISSED |z_1 - z_0|        nor do predictor and corrector,
     motion of the spectrum <= MOTION       Hausdorff distance of the two sets of values in the chordal metric.
 
-The next length aims at half of each limit and at few Newton iterations. Kinks of a piecewise smooth system turn by a
-finite angle over any step: below ``KINK`` times the longest step the angle is no longer an obstacle.
+The next length aims at half of each limit, at few Newton iterations, and not beyond the place where a value would
+become critical (`room`). Kinks of a piecewise smooth system turn by a finite angle over any step: below ``KINK`` times
+the longest step the angle is no longer an obstacle.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ __all__ = ["Comparison", "Steps", "compare", "predict", "spectral_motion"]
 Array = NDArray[np.float64]
 ANGLE, CHORD, MISSED, MOTION, KINK = 0.6, 0.15, 0.2, 0.7, 1e-4
 _FEW = 3
+_APPROACH, _CREEP = 0.8, 0.1
 
 
 @dataclass(frozen=True)
@@ -105,11 +107,36 @@ def compare(last: Point, new: Point, guess: tuple[Array, float]) -> Comparison:
     return Comparison(length, angle / ANGLE, chord / CHORD, missed / MISSED, motion / MOTION)
 
 
-def next_length(h: float, seen: Comparison, iterations: int, steps: Steps) -> float:
+def room(last: Point, new: Point) -> float:
+    """Arclength left until some value, at its present rate, is critical: growth Re(lambda) or log|mu|, or a product.
+
+    Steps that slow down before a crossing see pairs of crossings apart, and do not hop where branches cross.
+    """
+    a, b = last.spectrum.values, new.spectrum.values
+    if not b.size or a.size != b.size:
+        return math.inf
+    before, now = [last.tests[0], last.tests[1]], [new.tests[0], new.tests[1]]
+    nearest = np.abs(b[:, None] - a[None, :]).argmin(axis=1)
+    if last.problem.critical.circle:
+        with np.errstate(divide="ignore"):
+            before += np.log(np.abs(a[nearest])).tolist()
+            now += np.log(np.abs(b)).tolist()
+    else:
+        before += a.real[nearest].tolist()
+        now += b.real.tolist()
+    least = math.inf
+    for x, y in zip(before, now):
+        if x * y > 0 and abs(y) < abs(x):
+            least = min(least, abs(y) / (abs(x) - abs(y)))
+    return least * new.step
+
+
+def next_length(h: float, seen: Comparison, last: Point, new: Point, steps: Steps) -> float:
     """Aim at half of the limits; shorten where Newton needed many iterations, never more than double."""
     factor = 2.0
     if seen.worst > 0:
         factor = min(factor, 0.5 / seen.worst)
-    if iterations > _FEW:
-        factor = min(factor, 1.2 if iterations == _FEW + 1 else 0.7)
-    return min(steps.longest, h * max(0.4, factor))
+    if new.iterations > _FEW:
+        factor = min(factor, 1.2 if new.iterations == _FEW + 1 else 0.7)
+    ahead = max(_APPROACH * room(last, new), _CREEP * steps.longest)
+    return min(steps.longest, h * max(0.4, factor), ahead)
