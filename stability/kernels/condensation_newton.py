@@ -118,9 +118,10 @@ def _norm(weights, weight_T, dY, dT):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def newton(field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales, weights, weight_T,
+def newton(  # type: ignore[no-untyped-def]
+           field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales, weights, weight_T,
            P, free, nodes, Y, T, arc, t_nodes, t_Y, t_T, t_l, weight_l, ds, tolerance, max_iterations,
-           F, J, Fp, dT, LU, pivots, Z, M):  # type: ignore[no-untyped-def]  # fmt: skip
+           F, J, Fp, dT, LU, pivots, Z, M):  # fmt: skip
     """Correct (nodes, Y, T, P[free]) in place; `arc` = 1 with a tangent, 0 without (then P stays fixed).
 
     Returns (status, iterations, residual, sign, du, dY, dl, tangent of T, tangent of P[free]): du, dY, dl hold the last
@@ -227,8 +228,9 @@ def newton(field, period, span, phase, h, W, A, row_sums, update, kept, position
 
 
 @kernel
-def evaluate(field, period, span, phase, h, W, update, S, jump, scales, P, nodes, Y, T,
-             F, J, Fp, dT, stage, node):  # type: ignore[no-untyped-def]  # fmt: skip
+def evaluate(  # type: ignore[no-untyped-def]
+             field, period, span, phase, h, W, update, S, jump, scales, P, nodes, Y, T,
+             F, J, Fp, dT, stage, node):  # fmt: skip
     """Fill F, J, Fp, dT, T and the residuals stage (N, mn), node (N+1, n); returns (largest scaled residual, sigma)."""
     sigma = _evaluate(field, period, span, phase, P, Y, T, F, J, Fp, dT)
     return _residual(W, update, h, sigma, S, jump, nodes, Y, F, scales, stage, node), sigma

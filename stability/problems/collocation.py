@@ -25,6 +25,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import condensation_newton as kernels
+from ..kernels.condensation_reduced import monodromy_product
 from ..kernels.meshes import uniform_edges
 from ..protocols import Corrected, Spectrum, Tangent
 from .collocation_linearisation import CollocationLinearisation, Workspace
@@ -62,7 +63,7 @@ class Collocation(OrbitDiscretisation):
     accuracy : float
         Wanted error of the nodes over the states' scales; `adapt` chooses the number of intervals for it.
     adaptive : bool
-        False keeps mesh and scales as they are.
+        False keeps the mesh as it is (the scales still follow the solution).
     edges, scales, period_scale : arrays and number, optional
         Mesh in s (N + 1,), sizes of the states (n,) and of the period; by default uniform, 1 and 1, set by `adapt`.
 
@@ -128,7 +129,7 @@ class Collocation(OrbitDiscretisation):
         return np.asarray(np.sort(points[points < 1 - 1e-12]))
 
     @property
-    def halved(self) -> bool:
+    def halved(self) -> bool:  # type: ignore[override]
         """Whether the orbit is solved on half of its period."""
         return self.mesh.span != self.multiple
 
@@ -148,7 +149,7 @@ class Collocation(OrbitDiscretisation):
         return self.flow.position
 
     @property
-    def size(self) -> int:
+    def size(self) -> int:  # type: ignore[override]
         """Length of u."""
         return self.mesh.size
 
@@ -259,7 +260,7 @@ class Collocation(OrbitDiscretisation):
             before_p[index] -= dl[0, mesh.own]
             size = np.sqrt((weights * dY[1] ** 2).sum() + weight_T * t_period**2 + (weight * t_parameter) ** 2)
             new = Tangent(direction / size, float(t_parameter / size), weight)
-        linearisation = CollocationLinearisation(self, before, before_p, work, sign) if mesh is self.mesh else work
+        linearisation: Any = CollocationLinearisation(self, before, before_p, work, sign) if mesh is self.mesh else work
         if mesh is self.mesh and arc:
             self._memo["tangent"] = (u, index, new)
         return Corrected(u, params, new, float(residual), iterations, int(sign), linearisation, True)
@@ -301,7 +302,7 @@ class Collocation(OrbitDiscretisation):
         self, u: Array, params: Array, tangent: Tangent | None
     ) -> tuple[Collocation, Array, Tangent | None] | None:
         """A better mesh or better scales (see `orbit_adaption`), or None."""
-        return adapted(self, u, params, tangent) if self.adaptive else None
+        return adapted(self, u, params, tangent)
 
     def doubled(self, u: Array, params: Array, vector: Array) -> tuple[Collocation, Array, Array]:
         """The problem of twice the period, the orbit run through twice, and the direction (v(s), -v(s))."""
@@ -312,7 +313,8 @@ class Collocation(OrbitDiscretisation):
         """(change of u's nodes, corrected u at degree m + 1, its arrays) of one Newton step; None if it failed."""
         known = self._memo.get("refined")
         if known is not None and np.array_equal(known[0], u) and np.array_equal(known[1], params):
-            return known[2]  # type: ignore[no-any-return]
+            found_before: tuple[Array, Array, Workspace] | None = known[2]
+            return found_before
         mesh = self.mesh
         nodes, stages, rest = mesh.split(u)
         higher = mesh.raised[0]
@@ -324,7 +326,7 @@ class Collocation(OrbitDiscretisation):
             t_nodes, t_stages, t_rest = mesh.split(t.u)
             tangent = Tangent(higher.join(t_nodes, mesh.raise_degree(t_nodes, t_stages), t_rest), t.parameter, t.weight)
         found = self._newton(higher, start, params, index, tangent, 0.0, np.inf, 1)
-        result = None
+        result: Any = None
         if found.converged:
             change = higher.split(found.u)[0] - nodes
             result = (change, found.u, found.linearisation)
@@ -353,17 +355,18 @@ class Collocation(OrbitDiscretisation):
         refined = self.refined(linearisation.u, linearisation.params)
         if refined is None:
             return orbit_spectrum(values, np.inf)
-        other = self._spectral_of(refined[2].M)
+        other = self.spectral_of(refined[2].M)
         if self.mesh.own:
             other = deflated(other, direction)[0]
         error += spectrum_distance(values, eigenvalues(other)) + 1e-15 * float(np.abs(M).max()) * len(M)
         return orbit_spectrum(values, error)
 
-    def _spectral_of(self, factors: Array) -> Array:
-        from ..kernels.condensation_reduced import monodromy_product
-
+    def spectral_of(self, factors: Array) -> Array:
+        """M of the node relations M_j (N, n, n)."""
         product = monodromy_product(factors)
-        return np.asarray(np.linalg.solve(self.closure, product) * self.scales / self.scales[:, None])
+        if self.halved:
+            product = np.linalg.solve(self.closure, product)
+        return np.asarray(product * self.scales / self.scales[:, None])
 
     def _direction_of_flow(self, linearisation: CollocationLinearisation) -> Array:
         """f at phase zero over the scales: the direction of the trivial multiplier."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -60,6 +60,11 @@ class OrbitDiscretisation:
     multiple: int
     winding: Any
     halved = False
+    if TYPE_CHECKING:  # what the two add
+        correct: Any
+        linearise: Any
+        spectrum: Any
+        error: Any
 
     @cached_property
     def flow(self) -> CompiledField:

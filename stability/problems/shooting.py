@@ -100,7 +100,7 @@ class Shooting(OrbitDiscretisation):
         return int(self.system.n)
 
     @property
-    def size(self) -> int:
+    def size(self) -> int:  # type: ignore[override]
         """Length of u."""
         return self.segments * self.n + self.own
 
