@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from ..kernels.level_curves import critical_points, rim_roots, trace
 from ..kernels.propagators import step_edges, step_factors
+from ..kernels.spectral_radius import largest_root_slope
 from ..results.chart import BoundaryCurve, StabilityChart, TongueTip, normalised_multipliers
 from ..results.tiles import Layer, evaluate
 from .sampling import Sampler
@@ -132,6 +133,8 @@ def _levels(layer: Layer) -> list[tuple[str, Level]]:
         return [("+1", trace_level(1.0)), ("-1", trace_level(-1.0))]
     if layer.neutral:
         return _reciprocal_levels(layer) if layer.form == "reciprocal" else []
+    if layer.form in ("four", "reciprocal"):
+        return [("any", _largest_of_four(layer))]
     return [("any", _largest_multiplier(layer))]
 
 
@@ -140,19 +143,32 @@ def _reciprocal_levels(layer: Layer) -> list[tuple[str, Level]]:
 
     def combination(sign: float) -> Level:
         def level(x: Array, y: Array) -> tuple[Array, Array, Array]:
-            v, *slopes = evaluate(layer.tiles, x, y)
+            v, *slopes = evaluate(layer.tiles, x, y, count=3)
             out = [d[1] - sign * (d[0] + d[2]) for d in slopes]
             return v[1] + 2.0 - sign * (v[0] + v[2]), out[0], out[1]
 
         return level
 
     def discriminant(x: Array, y: Array) -> tuple[Array, Array, Array]:
-        v, *slopes = evaluate(layer.tiles, x, y)
+        v, *slopes = evaluate(layer.tiles, x, y, count=3)
         c1 = 0.5 * (v[0] + v[2])
         out = [c1 * (d[0] + d[2]) - 4.0 * d[1] for d in slopes]
         return c1 * c1 - 4.0 * v[1] + 8.0, out[0], out[1]
 
     return [("+1", combination(1.0)), ("-1", combination(-1.0)), ("pair", discriminant)]
+
+
+def _largest_of_four(layer: Layer) -> Level:
+    """log|mu| of the largest root of the quartic, with its gradient."""
+
+    def level(x: Array, y: Array) -> tuple[Array, Array, Array]:
+        c, *slopes = evaluate(layer.tiles, x, y, count=3)
+        (chi, sigma), *clock_slopes = evaluate(layer.tiles, x, y, "clock")
+        theta, parts = largest_root_slope(c, slopes)
+        damped = [(e[1] * chi - sigma * e[0]) / chi**2 for e in clock_slopes]
+        return theta + sigma / chi, parts[0] + damped[0], parts[1] + damped[1]
+
+    return level
 
 
 def _largest_multiplier(layer: Layer) -> Level:

@@ -131,7 +131,9 @@ class PeriodicLinear:
             steps = len(phase)
             s = np.broadcast_to(phase[:, None] if phase.ndim == 1 else phase, (steps, count))
             flat = np.ascontiguousarray(s).reshape(-1)
-            states = np.zeros((flat.size, n)) if motion is None else motion.at(s).reshape(-1, n)
+            states = (
+                np.zeros((flat.size, n)) if motion is None else np.ascontiguousarray(motion.at(phase).reshape(-1, n))
+            )
             each = P[0] if count == 1 else np.broadcast_to(P, (steps, count, m)).reshape(-1, m)
             values = self._jacobian(flat, states, each)
             if not np.isfinite(values).all():

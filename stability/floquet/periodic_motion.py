@@ -40,7 +40,7 @@ class Motion:
         c[1:] *= 2.0
         c[-1] *= 0.5
         size = np.abs(c).max(axis=(1, 2))
-        keep = max(1, int(np.flatnonzero(size > 1e-16 * max(size.max(), 1e-300)).max(initial=0)) + 1)
+        keep = max(1, int(np.flatnonzero(size > 2e-15 * max(size.max(), 1e-300)).max(initial=0)) + 1)
         return cls(c[:keep])
 
     @classmethod
@@ -51,7 +51,7 @@ class Motion:
         return cls(np.concatenate(padded, axis=1))
 
     def at(self, phase: Array) -> Array:
-        """x*(phase): (K, N, n) for phases (K, N)."""
+        """x*(phase): (K, N, n) for phases (K,) or (K, N)."""
         return self._sum(phase, self.coefficients)
 
     def rate(self, phase: Array) -> Array:
@@ -61,6 +61,11 @@ class Motion:
 
     @staticmethod
     def _sum(phase: Array, c: NDArray[np.complex128]) -> Array:
+        if phase.ndim == 1:  # the same phases for all nodes: one matrix product
+            harmonics = np.arange(len(c))
+            wave = 2.0 * np.pi * phase[:, None] * harmonics
+            flat = c.reshape(len(c), -1)
+            return (np.cos(wave) @ flat.real - np.sin(wave) @ flat.imag).reshape(len(phase), *c.shape[1:])
         out = np.zeros((*phase.shape, c.shape[2])) + c[0].real
         for k in range(1, len(c)):
             wave = 2.0 * np.pi * k * phase[..., None]

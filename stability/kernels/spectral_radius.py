@@ -10,7 +10,7 @@ Two states, half-period factors f = (u1', u2, u1, u2') of an even Hill equation:
 Two states, f = (M11 - M22, M12, M21, tr): s = (f0^2 + 4 f1 f2) / 4 = (tr^2 - 4) / 4, theta = arsinh(sqrt(max(s, 0))).
 Both keep the relative accuracy of s, on which theta depends by a square root, where tr -+ 2 alone would lose it.
 
-Four states, z^4 - c1 z^3 + c2 z^2 - c3 z + 1: the resolvent cubic y^3 - c2 y^2 + (c1 c3 - 4) y - (c1^2 + c3^2 - 4 c2) = 0
+Four states, z^4 - c1 z^3 + c2 z^2 - c3 z + 1: the resolvent cubic y^3 - c2 y^2 + (c1 c3 - 4) y = c1^2 + c3^2 - 4 c2
 has its largest real root y = q + 1/q >= 2, and the quartic is (z^2 - s1 z + q)(z^2 - s2 z + 1/q) with s1 + s2 = c1,
 s1 s2 = c2 - y and sign(s1 - s2) = -sign(c3 - c1 y / 2). If the polynomial is its own reciprocal (c1 = c3), with
 w = z + 1/z: w^2 - c1 w + c2 - 2 = 0 and cosh theta = (|w - 2| + |w + 2|) / 4, the largest over both w.
@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["four_states", "four_states_reciprocal", "polynomial_error"]
+__all__ = ["four_states", "four_states_reciprocal", "largest_root_slope", "polynomial_error"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
@@ -74,6 +74,13 @@ def four_states(c: Array) -> tuple[Array, Codes, Array]:
     >>> bool(abs(theta[0] - np.log(2)) < 1e-14), int(kind[0])
     (True, 1)
     """
+    theta, z, slope = _largest_root(c)
+    kind = np.where(z.imag != 0, 3, np.where(z.real >= 0, 1, 2)).astype(np.int8)
+    return theta, kind, slope
+
+
+def _largest_root(c: Array) -> tuple[Array, NDArray[np.complex128], Array]:
+    """log of the largest modulus, the root itself (imaginary part >= 0), and 1 / |z P'(z)|."""
     c1, c2, c3 = c
     y = np.maximum(_largest_cubic_root(c2, c1 * c3 - 4.0, c1 * c1 + c3 * c3 - 4.0 * c2), 2.0)
     q = 0.5 * (y + np.sqrt((y - 2.0) * (y + 2.0)))
@@ -98,8 +105,18 @@ def four_states(c: Array) -> tuple[Array, Codes, Array]:
     o_re = z_re * z_re - z_im * z_im - other_s * z_re + other_p
     o_im = z_im * (2.0 * z_re - other_s)
     slope = 1.0 / np.maximum(radius * np.sqrt(np.abs(own) * (o_re * o_re + o_im * o_im)), 1e-300)
-    kind = np.where(real, np.where(s >= 0, 1, 2), 3).astype(np.int8)
-    return np.log(radius), kind, slope
+    return np.log(radius), z_re + 1j * z_im, slope
+
+
+def largest_root_slope(c: Array, changes: list[Array]) -> tuple[Array, list[Array]]:
+    """log of the spectral radius of the quartic c (3, B), and its change with c: one array (B,) per dc (3, B).
+
+    With the largest root z, d log|z| = Re(dz / z) and dz = (z^3 dc1 - z^2 dc2 + z dc3) / P'(z).
+    """
+    theta, z, _ = _largest_root(c)
+    slope = ((4.0 * z - 3.0 * c[0]) * z + 2.0 * c[1]) * z - c[2]
+    safe = np.where(np.abs(slope) > 1e-300, slope, 1.0)
+    return theta, [(((z * d[0] - d[1]) * z + d[2]) / safe).real for d in changes]
 
 
 def _pair_radius(s: Array, p: Array) -> Array:

@@ -62,10 +62,12 @@ class Layer:
     tiles: tuple[Tile, ...]
 
 
-def evaluate(tiles: tuple[Tile, ...], x: Array, y: Array, which: str = "fields") -> tuple[Array, Array, Array]:
+def evaluate(
+    tiles: tuple[Tile, ...], x: Array, y: Array, which: str = "fields", count: int | None = None
+) -> tuple[Array, Array, Array]:
     """Values and exact derivatives d/dx, d/dy of ``fields`` or ``clock`` at points (B,): three arrays (Q, B).
 
-    Points outside all tiles take the nearest tile's edge value.
+    `count` limits the work to the first functions. Points outside all tiles take the nearest tile's edge value.
     """
     x, y = np.broadcast_arrays(np.atleast_1d(np.asarray(x, float)), np.atleast_1d(np.asarray(y, float)))
     owner = np.zeros(x.shape, dtype=int)
@@ -74,12 +76,12 @@ def evaluate(tiles: tuple[Tile, ...], x: Array, y: Array, which: str = "fields")
         outside_x = np.maximum(boxes[:, :1] - x, x - boxes[:, 1:2]) / np.ptp(boxes[:, :2])
         outside_y = np.maximum(boxes[:, 2:3] - y, y - boxes[:, 3:]) / np.ptp(boxes[:, 2:])
         owner = np.maximum(np.maximum(outside_x, outside_y), 0.0).argmin(axis=0)
-    first = getattr(tiles[0], which)
+    first = getattr(tiles[0], which)[:count]
     out = tuple(np.empty((len(first), x.size)) for _ in range(3))
     for index in np.unique(owner):
         tile, here = tiles[index], owner == index
         xi, eta = tile.scaled(x[here], y[here])
-        value, in_xi, in_eta = at_points(getattr(tile, which), xi, eta)
+        value, in_xi, in_eta = at_points(getattr(tile, which)[:count], xi, eta)
         x0, x1, y0, y1 = tile.box
         out[0][:, here], out[1][:, here], out[2][:, here] = value, in_xi * 2.0 / (x1 - x0), in_eta * 2.0 / (y1 - y0)
     return out[0], out[1], out[2]
