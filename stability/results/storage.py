@@ -134,10 +134,27 @@ def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, N
 def load(path: str | os.PathLike[str]) -> Any:
     """Read a stored result (Branch, SpecialPoint, StabilityChart, ...); no solver is imported, so plotting is cheap.
 
+    Parameters
+    ----------
+    path : str or path
+        An ``.npz`` file that the result's ``save`` wrote.
+
+    Returns
+    -------
+    The result, of its own class.
+
     Raises
     ------
     FileNotFoundError, FileFormatError
         No such file; not a stored result, damaged, or of a kind this version does not know.
+
+    Examples
+    --------
+    >>> import stability as st
+    >>> tongues = st.chart(st.models.mathieu(), x=("a", 0.1, 0.4), y=("b", 0, 0.2), shape=(20, 10))
+    >>> tongues.save("tongues.npz")
+    >>> st.load("tongues.npz").growth_rate.shape
+    (10, 20)
     """
     schema, header, arrays = read(path)
     if schema not in _CLASSES and schema in _HOMES:

@@ -34,6 +34,12 @@ class HardStop:
     ------
     InputError
         If the restitution is outside [0, 1], the position not finite or the side not +1 or -1.
+
+    Examples
+    --------
+    >>> import stability as st
+    >>> st.HardStop("y", position=0.004, restitution=0.8).side
+    1
     """
 
     coordinate: str

@@ -285,7 +285,7 @@ class System(Constructors):
 
         >>> import stability as st
         >>> print(st.models.van_der_pol().latex().splitlines()[1])
-        \ddot{x} &= \mu \left(1 - x^{2}\right) \dot{x} - x
+        \ddot{x} &= \mu \dot{x} \left(1 - x^{2}\right) - x
         """
         from .printing import latex_equations
 
