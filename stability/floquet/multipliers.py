@@ -6,6 +6,7 @@ the error ``|dM|``:
 * n = 2. With ``D = ((M11 - M22)/2)^2 + M12 M21`` the multipliers are ``tr/2 +- sqrt D``; real ones: the larger by
   this formula, the smaller as ``det/mu``, so that it keeps its relative accuracy however small it is; a pair: of
   modulus ``sqrt det``. The error follows from those of trace and D, including the square root at ``D = 0``.
+* Decoupled or one-way coupled states: the multipliers are those of the diagonal blocks, each with its own error.
 * n > 2. If all moduli are of similar size, ``eig(M)``; else the eigenvalues of the product from the factors
   (`stability.kernels.periodic_schur`). First-order error ``|y| |dM| |x| / |y^H x|`` while it is small against the gap
   to the next multiplier, else the bound of Elsner, ``|dmu| <= (|M| + |M + dM|)^(1 - 1/n) |dM|^(1/n)``.
@@ -18,6 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.block_triangular import mutual_blocks
 from ..kernels.periodic_schur import product_eigenvalues
 
 __all__ = ["multipliers_with_errors"]
@@ -31,8 +33,8 @@ _EPS = float(np.finfo(float).eps)
 
 def multipliers_with_errors(
     matrix: Array, factors: Array, log_determinant: float, error: float
-) -> tuple[Complex, Array]:
-    """Multipliers (n,), descending modulus, and their absolute errors (n,).
+) -> tuple[Complex, Array, NDArray[np.intp]]:
+    """Multipliers (n,), descending modulus, their absolute errors (n,), and the block of coupled states of each.
 
     Parameters
     ----------
@@ -45,12 +47,39 @@ def multipliers_with_errors(
     -----
     *Accuracy*: checked against closed forms (constant coefficients, Meissner) and 30-digit values down to 1e-28.
     """
+    blocks = mutual_blocks((matrix != 0) | (factors != 0).any(axis=0))
+    if len(blocks) > 1:
+        return _blockwise(matrix, factors, blocks, error)
+    values, errors = _coupled(matrix, factors, log_determinant, error)
+    return values, errors, np.zeros(len(values), dtype=np.intp)
+
+
+def _coupled(matrix: Array, factors: Array, log_determinant: float, error: float) -> tuple[Complex, Array]:
+    """One block of coupled states."""
     if len(matrix) == 1:
         value = float(np.exp(log_determinant)) if matrix[0, 0] > 0 else float(matrix[0, 0])
         return np.array([value], dtype=complex), np.array([error])
     if len(matrix) == 2:
         return _two(matrix, log_determinant, error)
     return _many(matrix, factors, error)
+
+
+def _blockwise(
+    matrix: Array, factors: Array, blocks: list[NDArray[np.intp]], error: float
+) -> tuple[Complex, Array, NDArray[np.intp]]:
+    """Each diagonal block of a block-triangular period map by itself."""
+    values, errors = [], []
+    for members in blocks:
+        part = np.ix_(members, members)
+        own = np.ascontiguousarray(factors[:, part[0], part[1]])
+        logarithm = float(np.sum(np.linalg.slogdet(own)[1]))
+        v, e = _coupled(matrix[part], own, logarithm, error)
+        values.append(v)
+        errors.append(e)
+    joined, spread = np.concatenate(values), np.concatenate(errors)
+    labels = np.repeat(np.arange(len(blocks)), [len(b) for b in blocks])
+    order = np.lexsort((-joined.imag, -np.round(np.abs(joined), 13)))
+    return joined[order], spread[order], labels[order]
 
 
 def _two(matrix: Array, log_determinant: float, error: float) -> tuple[Complex, Array]:

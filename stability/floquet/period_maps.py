@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError, NonFiniteError
+from ..kernels.block_triangular import mutual_blocks
 from ..kernels.propagators import ordered_product, rounding_error, step_edges, step_factors
 from ..words import Crossing, Verdict
 from .along_orbits import orbit_generator
@@ -148,13 +149,15 @@ def monodromy(system: System, about: Any = None, *, tolerance: float = 1e-13, **
     values, generator, period, breaks, trivial = _prepare(system, about, params)
     matrix, factors, matrix_error, steps = _integrate(generator, breaks, tolerance, values)
     log_determinant, defect = _liouville(generator, breaks, factors)
-    multipliers, errors = multipliers_with_errors(matrix, factors, log_determinant, matrix_error)
+    multipliers, errors, block = multipliers_with_errors(matrix, factors, log_determinant, matrix_error)
     index = int(np.argmin(np.abs(multipliers - 1.0))) if trivial else None
     if index is not None:
         # the trivial multiplier shows how far the orbit itself is from being one
         errors = np.maximum(errors, abs(multipliers[index] - 1.0) * np.minimum(1.0, np.abs(multipliers)))
     judged = np.arange(len(multipliers)) if index is None else np.delete(np.arange(len(multipliers)), index)
-    verdict, kind, counts = classify(multipliers[judged], errors[judged], neutral=_reciprocal(generator))
+    verdict, kind, counts = classify(
+        multipliers[judged], errors[judged], neutral=_reciprocal(generator), block=block[judged]
+    )
     with np.errstate(divide="ignore"):
         exponents = np.asarray(np.log(multipliers) / period, dtype=complex)
     return Monodromy(
@@ -260,8 +263,14 @@ def _liouville(generator: Generator, breaks: Array, factors: Array) -> tuple[flo
 
 
 def _reciprocal(generator: Generator) -> bool:
-    """Whether structure proves reciprocal multipliers: n = 2 trace-free, or ``x'' + K(t) x = 0``, K symmetric."""
+    """Whether structure proves reciprocal multipliers in each block of mutually coupled states."""
     A = generator(_PROBES)[:, 0]
+    blocks = mutual_blocks((A != 0).any(axis=0))
+    return all(_reciprocal_block(A[:, members[:, None], members]) for members in blocks)
+
+
+def _reciprocal_block(A: Array) -> bool:
+    """n = 2 trace-free, or ``x'' + K(t) x = 0`` with K symmetric."""
     n = A.shape[-1]
     size = float(np.abs(A).max(initial=0.0))
     if n == 2:

@@ -46,7 +46,9 @@ class Classification(NamedTuple):
     counts: Counts
 
 
-def classify(multipliers: ArrayLike, error: ArrayLike = 0.0, neutral: bool = False) -> Classification:
+def classify(
+    multipliers: ArrayLike, error: ArrayLike = 0.0, neutral: bool = False, block: ArrayLike = 0
+) -> Classification:
     """Verdict on the stability of a periodic linear system.
 
     Parameters
@@ -55,6 +57,8 @@ def classify(multipliers: ArrayLike, error: ArrayLike = 0.0, neutral: bool = Fal
     error : float or (n,), absolute error of the multipliers, >= 0.
     neutral : the structure of the equations proves that multipliers come in pairs mu, 1/mu (undamped Hill equation,
         conservative or reversible system).
+    block : int or (n,), which block of coupled states a multiplier belongs to; only multipliers of the same block can
+        meet on the unit circle and leave it.
 
     Returns
     -------
@@ -97,13 +101,14 @@ def classify(multipliers: ArrayLike, error: ArrayLike = 0.0, neutral: bool = Fal
         return Classification(Verdict.UNSTABLE, kind, counts)
     if np.all(excess < -radius):
         return Classification(Verdict.STABLE, None, counts)
-    if neutral and np.all(np.abs(excess) <= radius + 4.0 * np.finfo(float).eps) and _disjoint(mu, radius):
+    if neutral and np.all(np.abs(excess) <= radius + 4.0 * np.finfo(float).eps) and _disjoint(mu, radius, block):
         return Classification(Verdict.NEUTRAL, None, counts)
     return Classification(Verdict.UNDETERMINED, None, counts)
 
 
-def _disjoint(mu: np.ndarray, radius: np.ndarray) -> bool:
-    """Whether no two discs meet."""
-    distance = np.abs(mu[:, None] - mu[None, :])
+def _disjoint(mu: np.ndarray, radius: np.ndarray, block: ArrayLike) -> bool:
+    """Whether no two discs of the same block meet."""
+    label = np.broadcast_to(np.asarray(block), mu.shape)
+    distance = np.where(label[:, None] == label[None, :], np.abs(mu[:, None] - mu[None, :]), np.inf)
     np.fill_diagonal(distance, np.inf)
     return bool(np.all(distance > radius[:, None] + radius[None, :] + 4.0 * np.finfo(float).eps))
