@@ -78,17 +78,33 @@ def back_substitute(T, size, width):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _assemble(W, A, row_sums, scale, J, first, kept, position, columns, T):  # type: ignore[no-untyped-def]
-    """T = [G' | du_0 columns | C'] of one interval; `first` is the index of its first stage in J."""
+def _integrated(A, kept, position, n, columns, j, H):  # type: ignore[no-untyped-def]
+    """H (m, s, K): sum_k A_ik C_k of the equations x' = v, for each kept velocity."""
+    degree, small, extra = A.shape[0], kept.shape[0], columns.shape[2]
+    for c in range(small):
+        a = position[c]
+        if a >= 0:
+            for i in range(degree):
+                for e in range(extra):
+                    H[i, c, e] = 0.0
+                for k in range(degree):
+                    factor = A[i, k]
+                    for e in range(extra):
+                        H[i, c, e] += factor * columns[j, k * n + a, e]
+
+
+@kernel(inline=True)
+def _assemble(W, A, row_sums, scale, J, first, kept, position, columns, j, H, T):  # type: ignore[no-untyped-def]
+    """T = [G' | du_0 columns | C'] of interval j; `first` is the index of its first stage in J."""
     degree, small, n = W.shape[0], kept.shape[0], J.shape[1]
-    size, extra = degree * small, columns.shape[1]
+    size, extra = degree * small, columns.shape[2]
     for i in range(degree):
         for c in range(small):
             row, state = i * small + c, kept[c]
             for k in range(size + n):
                 T[row, k] = 0.0
-            for k in range(extra):
-                T[row, size + n + k] = columns[i * n + state, k]
+            for e in range(extra):
+                T[row, size + n + e] = columns[j, i * n + state, e]
             for k in range(degree):
                 T[row, k * small + c] = W[i, k]
             T[row, size + state] = row_sums[i]
@@ -99,41 +115,39 @@ def _assemble(W, A, row_sums, scale, J, first, kept, position, columns, T):  # t
                     slope = scale * J[first + i, state, a]
                     if slope != 0.0:
                         T[row, size + a] += slope
+                        twice = slope * scale
                         for k in range(degree):
-                            T[row, k * small + b] -= slope * scale * A[i, k]
-                            for e in range(extra):
-                                T[row, size + n + e] += slope * A[i, k] * columns[k * n + a, e]
+                            T[row, k * small + b] -= twice * A[i, k]
+                        for e in range(extra):
+                            T[row, size + n + e] += slope * H[i, b, e]
 
 
 @kernel(inline=True)
-def _expand(A, scale, kept, position, T, size, n, columns, Z):  # type: ignore[no-untyped-def]
-    """The stages of all states from those of the kept ones: columns (mn, K) and Z (mn, n) in place."""
-    degree, small, extra = A.shape[0], kept.shape[0], columns.shape[1]
-    hold = np.empty(degree)
+def _expand(A, scale, kept, position, T, size, n, H, columns, Z, j):  # type: ignore[no-untyped-def]
+    """The stages of all states from those of the kept ones: columns[j] (mn, K) and Z[j] (mn, n)."""
+    degree, small, extra = A.shape[0], kept.shape[0], columns.shape[2]
     for c in range(small):
-        a = position[c]
+        a, state = position[c], kept[c]
+        for i in range(degree):
+            for b in range(n):
+                Z[j, i * n + state, b] = T[i * small + c, size + b]
+            for e in range(extra):
+                columns[j, i * n + state, e] = T[i * small + c, size + n + e]
         if a < 0:
             continue
-        for e in range(extra):
-            for i in range(degree):
-                value = 0.0
-                for k in range(degree):
-                    value += A[i, k] * (columns[k * n + a, e] + scale * T[k * small + c, size + n + e])
-                hold[i] = value
-            for i in range(degree):
-                columns[i * n + a, e] = hold[i]
         for i in range(degree):
+            row = i * n + a
             for b in range(n):
-                value = 1.0 if b == a else 0.0
-                for k in range(degree):
-                    value += scale * A[i, k] * T[k * small + c, size + b]
-                Z[i * n + a, b] = value
-    for c in range(small):
-        for i in range(degree):
+                Z[j, row, b] = 0.0
+            Z[j, row, a] = 1.0
             for e in range(extra):
-                columns[i * n + kept[c], e] = T[i * small + c, size + n + e]
-            for b in range(n):
-                Z[i * n + kept[c], b] = T[i * small + c, size + b]
+                columns[j, row, e] = H[i, c, e]
+            for k in range(degree):
+                factor = scale * A[i, k]
+                for b in range(n):
+                    Z[j, row, b] += factor * T[k * small + c, size + b]
+                for e in range(extra):
+                    columns[j, row, e] += factor * T[k * small + c, size + n + e]
 
 
 @kernel
@@ -146,23 +160,26 @@ def condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, p
     intervals, extra = columns.shape[0], columns.shape[2]
     degree, small, n = W.shape[0], kept.shape[0], J.shape[1]
     size = degree * small
-    T = np.empty((size, size + n + extra))
+    T, H = np.empty((size, size + n + extra)), np.empty((degree, small, extra))
+    swaps = np.empty(size, np.int64)
     total = 1.0
     for i in range(degree):
         total -= update[i]
     sign = 1.0
     for j in range(intervals):
         scale = h[j] * sigma
-        _assemble(W, A, row_sums, scale, J, j * degree, kept, position, columns[j], T)
-        one = eliminate(T, size, size, size + n + extra, pivots[j])
+        _integrated(A, kept, position, n, columns, j, H)
+        _assemble(W, A, row_sums, scale, J, j * degree, kept, position, columns, j, H, T)
+        one = eliminate(T, size, size, size + n + extra, swaps)
         sign *= one
         if one == 0.0:
             return 0.0
         for row in range(size):
+            pivots[j, row] = swaps[row]
             for k in range(size):
                 LU[j, row, k] = T[row, k]
         back_substitute(T, size, size + n + extra)
-        _expand(A, scale, kept, position, T, size, n, columns[j], Z[j])
+        _expand(A, scale, kept, position, T, size, n, H, columns, Z, j)
         for a in range(n):
             for b in range(n):
                 value = total if a == b else 0.0
@@ -178,22 +195,22 @@ def solve_stages(A, h, sigma, J, kept, position, LU, pivots, columns):  # type: 
     intervals, extra = columns.shape[0], columns.shape[2]
     degree, small, n = A.shape[0], kept.shape[0], J.shape[1]
     size = degree * small
-    T = np.empty((size, n + extra))  # the place of Z is not used
-    Z = np.empty((degree * n, n))
+    T, H, Z = np.empty((size, n + extra)), np.empty((degree, small, extra)), np.empty((1, degree * n, n))
+    part = np.empty((1, degree * n, extra))
     for j in range(intervals):
         scale = h[j] * sigma
+        _integrated(A, kept, position, n, columns, j, H)
         for i in range(degree):
             for c in range(small):
-                for e in range(extra):
-                    value = columns[j, i * n + kept[c], e]
-                    for b in range(small):
-                        a = position[b]
-                        if a >= 0:
-                            for k in range(degree):
-                                value += scale * J[j * degree + i, kept[c], a] * A[i, k] * columns[j, k * n + a, e]
-                    T[i * small + c, n + e] = value
                 for b in range(n):
                     T[i * small + c, b] = 0.0
+                for e in range(extra):
+                    T[i * small + c, n + e] = columns[j, i * n + kept[c], e]
+                for b in range(small):
+                    if position[b] >= 0:
+                        slope = scale * J[j * degree + i, kept[c], position[b]]
+                        for e in range(extra):
+                            T[i * small + c, n + e] += slope * H[i, b, e]
         for p in range(size):
             row = pivots[j, p]
             if row != p:
@@ -208,7 +225,10 @@ def solve_stages(A, h, sigma, J, kept, position, LU, pivots, columns):  # type: 
                 T[p, k] /= LU[j, p, p]
                 for i in range(p):
                     T[i, k] -= LU[j, i, p] * T[p, k]
-        _expand(A, scale, kept, position, T, 0, n, columns[j], Z)
+        _expand(A, scale, kept, position, T, 0, n, H, part, Z, 0)
+        for row in range(degree * n):
+            for e in range(extra):
+                columns[j, row, e] = part[0, row, e]
 
 
 @kernel

@@ -121,13 +121,14 @@ def _chain(E, g, count, ends, borders, reduced, R):  # type: ignore[no-untyped-d
     n, extra = g.shape[1], g.shape[2]
     q = borders.shape[0]
     width = 3 * n + extra
-    T = np.zeros((2 * n, width))
+    T = np.empty((2 * n, width))
     swaps = np.empty(n, np.int64)
     sign = 1.0
     for a in range(n):
-        T[a, a] = 1.0
         for b in range(n):
+            T[a, b] = 0.0
             T[a, n + b] = -E[0, a, b]
+        T[a, a] = 1.0
         for k in range(extra):
             T[a, 3 * n + k] = g[0, a, k]
     for i in range(1, count):
@@ -174,8 +175,10 @@ def _dense(T, borders, reduced, S, end, tangent):  # type: ignore[no-untyped-def
     intervals = borders.shape[1] - 1
     sides = extra - q + tangent
     size = n + q
-    D = np.zeros((size, size + sides))
+    D = np.empty((size, size + sides))
     for a in range(size):
+        for b in range(size, size + sides):
+            D[a, b] = 0.0
         for b in range(n):
             D[a, b] = T[a, n + b] if a < n else borders[a - n, 0, b]
         for k in range(extra):
@@ -220,9 +223,9 @@ def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent
     count = _group(M, Q, borders, reduced, ends, E, g)
     R = np.empty((max(count - 1, 1), n, 3 * n + extra))
     T, sign = _chain(E, g, count, ends, borders, reduced, R)
-    du = np.zeros((sides, intervals + 1, n))
-    dY = np.zeros((sides, intervals, size))
-    dl = np.zeros((sides, q))
+    du = np.empty((sides, intervals + 1, n))
+    dY = np.empty((sides, intervals, size))
+    dl = np.empty((sides, q))
     if sign == 0.0:
         return du, dY, dl, 0.0
     D, one = _dense(T, borders, reduced, S, nodes[intervals], tangent)
@@ -282,8 +285,10 @@ def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent
 def monodromy_product(M):  # type: ignore[no-untyped-def]
     """M_{N-1} .. M_0."""
     intervals, n, _ = M.shape
-    product = np.zeros((n, n))
+    product = np.empty((n, n))
     for a in range(n):
+        for b in range(n):
+            product[a, b] = 0.0
         product[a, a] = 1.0
     work = np.empty((n, n))
     for j in range(intervals):

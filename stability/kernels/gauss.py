@@ -65,15 +65,17 @@ def lagrange_matrix(abscissae: np.ndarray, at: np.ndarray, derivative: bool = Fa
     """
     x, t = np.asarray(abscissae, float), np.atleast_1d(np.asarray(at, float))
     size = len(x)
+    scale = np.prod(x[:, None] - x + np.eye(size), axis=1)
+    if not derivative:
+        ones, gaps = np.ones((len(t), 1)), t[:, None] - x
+        left = np.cumprod(np.concatenate([ones, gaps[:, :-1]], axis=1), axis=1)
+        right = np.cumprod(np.concatenate([ones, gaps[:, :0:-1]], axis=1), axis=1)[:, ::-1]
+        return np.asarray(left * right / scale)
     out = np.zeros((len(t), size))
     for k in range(size):
         others = np.delete(x, k)
-        scale = np.prod(x[k] - others)
-        if not derivative:
-            out[:, k] = np.prod(t[:, None] - others, axis=1) / scale
-            continue
         for drop in range(size - 1):
-            out[:, k] += np.prod(t[:, None] - np.delete(others, drop), axis=1) / scale
+            out[:, k] += np.prod(t[:, None] - np.delete(others, drop), axis=1) / scale[k]
     return out
 
 

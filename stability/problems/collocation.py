@@ -16,6 +16,7 @@ Problems for Ordinary Differential Equations*, chapters 5, 7, 9.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -41,6 +42,10 @@ Array = np.ndarray
 _MAX_ITERATIONS = {0: 30, 1: 8}  # without and with a tangent
 _NOTES = {kernels.NO_CONVERGENCE: "no convergence", kernels.SINGULAR: "singular"}
 _MAX_INTERVALS = 1000
+
+
+def _same(a: Array, b: Array) -> bool:
+    return a is b or np.array_equal(a, b)
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,6 +190,11 @@ class Collocation(OrbitDiscretisation):
         return self.mesh.quadrature(self.scales)
 
     @cached_property
+    def _raised_quadrature(self) -> Array:
+        """The same on the mesh of degree m + 1."""
+        return self.mesh.raised[0].quadrature(self.scales)
+
+    @cached_property
     def weights(self) -> Array:
         """(N,) of the inner product: zero at the nodes."""
         nodes = np.zeros((self.mesh.intervals + 1, self.mesh.n))
@@ -237,7 +247,7 @@ class Collocation(OrbitDiscretisation):
         t_nodes, t_stages, t_rest = mesh.split(u if tangent is None else tangent.u)
         t_T = float(t_rest[0]) if mesh.own and arc else 0.0
         t_l, weight = (0.0, 0.0) if tangent is None else (float(tangent.parameter), float(tangent.weight))
-        weights = self.quadrature if mesh is self.mesh else mesh.quadrature(self.scales)
+        weights = self.quadrature if mesh is self.mesh else self._raised_quadrature
         rule, weight_T = mesh.rule, self.period_scale**-2 * mesh.own
         status, iterations, residual, sign, du, dY, dl, t_period, t_parameter = kernels.newton(
             self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.matrix,
@@ -250,19 +260,23 @@ class Collocation(OrbitDiscretisation):
         if status != kernels.CONVERGED:
             note = _NOTES.get(status) or self._not_finite(mesh, work)
             return Corrected(u, params, None, float(residual), iterations, 0, None, False, note)
-        before, before_p = u - mesh.join(du[0], dY[0], dl[0, : mesh.own]), params.copy()
-        if mesh.own:
-            work.T[0] = before[-1]
+        change_T = float(dl[0, 0]) if mesh.own else 0.0
+        change_l = float(dl[0, mesh.own]) if arc else 0.0
+        work.T[0] -= change_T
         direction = mesh.join(du[1], dY[1], t_period)
         if tangent is None:
             new = Tangent(direction, 1.0, 1.0)
         else:
-            before_p[index] -= dl[0, mesh.own]
-            size = np.sqrt((weights * dY[1] ** 2).sum() + weight_T * t_period**2 + (weight * t_parameter) ** 2)
-            new = Tangent(direction / size, float(t_parameter / size), weight)
-        linearisation: Any = CollocationLinearisation(self, before, before_p, work, sign) if mesh is self.mesh else work
-        if mesh is self.mesh and arc:
-            self._memo["tangent"] = (u, index, new)
+            square = float(np.dot((weights * dY[1]).ravel(), dY[1].ravel()))
+            size = math.sqrt(square + weight_T * t_period**2 + (weight * t_parameter) ** 2)
+            direction /= size
+            new = Tangent(direction, float(t_parameter / size), weight)
+        linearisation: Any = work
+        if mesh is self.mesh:
+            correction = (du[0], dY[0], change_T, change_l, index)
+            linearisation = CollocationLinearisation(self, u, params, work, sign, correction)
+            if arc:
+                self._memo["tangent"] = (u, index, new)
         return Corrected(u, params, new, float(residual), iterations, int(sign), linearisation, True)
 
     def _not_finite(self, mesh: OrbitMesh, work: Workspace) -> str:
@@ -312,7 +326,7 @@ class Collocation(OrbitDiscretisation):
     def refined(self, u: Array, params: Array) -> tuple[Array, Array, Workspace] | None:
         """(change of u's nodes, corrected u at degree m + 1, its arrays) of one Newton step; None if it failed."""
         known = self._memo.get("refined")
-        if known is not None and np.array_equal(known[0], u) and np.array_equal(known[1], params):
+        if known is not None and _same(known[0], u) and _same(known[1], params):
             found_before: tuple[Array, Array, Workspace] | None = known[2]
             return found_before
         mesh = self.mesh
@@ -321,7 +335,7 @@ class Collocation(OrbitDiscretisation):
         start = higher.join(nodes, mesh.raise_degree(nodes, stages), rest)
         index, tangent = 0, None
         at = self._memo.get("tangent")
-        if at is not None and np.array_equal(at[0], u):
+        if at is not None and _same(at[0], u):
             index, t = at[1], at[2]
             t_nodes, t_stages, t_rest = mesh.split(t.u)
             tangent = Tangent(higher.join(t_nodes, mesh.raise_degree(t_nodes, t_stages), t_rest), t.parameter, t.weight)
@@ -330,7 +344,7 @@ class Collocation(OrbitDiscretisation):
         if found.converged:
             change = higher.split(found.u)[0] - nodes
             result = (change, found.u, found.linearisation)
-        self._memo["refined"] = (np.array(u), np.array(params), result)
+        self._memo["refined"] = (u, params, result)
         return result
 
     def error(self, u: Array, params: Array) -> float:
@@ -352,7 +366,7 @@ class Collocation(OrbitDiscretisation):
             direction = self._direction_of_flow(linearisation)
             M, error = deflated(M, direction)
         values = eigenvalues(M)
-        refined = self.refined(linearisation.u, linearisation.params)
+        refined = self.refined(linearisation.solution, linearisation.solution_params)
         if refined is None:
             return orbit_spectrum(values, np.inf)
         other = self.spectral_of(refined[2].M)

@@ -15,7 +15,7 @@ which needs second directional derivatives f_zz[(V, lambda), e_k] only, all k in
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -50,14 +50,35 @@ class Workspace:
 
 @dataclass(frozen=True, eq=False)
 class CollocationLinearisation:
-    """F, F_u and spectral data at (u, p); see `protocols.Linearisation`. `sign` = 0: a singular interval."""
+    """F, F_u and spectral data at (u, p); see `protocols.Linearisation`. `sign` = 0: a singular interval.
+
+    A Newton solve leaves the linearisation of its last iterate: `correction` = (nodes, stages, period, parameter, its
+    index) leads from there to the solution `solution`, `solution_params`.
+    """
 
     problem: Collocation
-    u: Array
-    params: Array
+    solution: Array
+    solution_params: Array
     work: Workspace
     sign: float
-    _memo: dict[str, Any] = field(default_factory=dict)
+    correction: tuple[Array, Array, float, float, int] | None = None
+
+    @cached_property
+    def u(self) -> Array:
+        """(N,) where the linearisation is taken."""
+        if self.correction is None:
+            return self.solution
+        nodes, stages, period, _, _ = self.correction
+        return np.asarray(self.solution - self.mesh.join(nodes, stages, period))
+
+    @cached_property
+    def params(self) -> Array:
+        """(m,) where the linearisation is taken."""
+        params = self.solution_params
+        if self.correction is not None and self.correction[3] != 0.0:
+            params = params.copy()
+            params[self.correction[4]] -= self.correction[3]
+        return params
 
     # ------------------------------------------------------------------ shorthands
     @property
@@ -169,8 +190,7 @@ class CollocationLinearisation:
     @cached_property
     def spectral(self) -> Array:
         """M = D^-1 S^-1 Phi D."""
-        D = self.problem.scales
-        return np.asarray(np.linalg.solve(self.problem.closure, self.fundamental) * D / D[:, None])
+        return self.problem.spectral_of(self.work.M)
 
     def _variation(self, start: Array, tau: float, free: int, amount: float) -> tuple[Array, Array]:
         """Nodes (N + 1, n), stages (N, mn) of the variation with dx(0) = start, dT = tau, dp_free = amount."""

@@ -44,28 +44,31 @@ def adapted(
     """(problem, u, tangent) with a better mesh or better scales; None where the present ones are good."""
     mesh = problem.mesh
     nodes, stages, rest = mesh.split(u)
-    scales = state_scales(np.concatenate([nodes, stages.reshape(-1, mesh.n)]))
+    scales = state_scales(stages.reshape(-1, mesh.n))
     period_scale = float(rest[0]) if mesh.own else 1.0
     ratios = np.append(scales / problem.scales, period_scale / problem.period_scale)
     rescale = bool((ratios > 2).any() or (ratios < 0.5).any())
     if not rescale:
         scales, period_scale = problem.scales, problem.period_scale
+    if not problem.adaptive and not rescale:
+        return None
     error = problem.error(u, params)
     breaks = problem.break_points(params)
     rho = monitor(mesh.edges, mesh.leading(nodes, stages) / scales, mesh.degree, breaks)
     share = rho * mesh.h
-    count = _wanted_intervals(problem, error)
+    count = _wanted_intervals(problem, error) if problem.adaptive else mesh.intervals
     moved = any(np.abs(mesh.edges - b).min() > 1e-12 for b in breaks)
-    uneven = error > 1e-2 * problem.accuracy and share.max() > _UNEVEN * share.mean()
+    uneven = problem.adaptive and error > 1e-2 * problem.accuracy and share.max() > _UNEVEN * share.mean()
     if not (rescale or moved or uneven or count != mesh.intervals):
         return None
     edges = mesh.edges
     if moved or uneven or count != mesh.intervals:
         edges = equidistribute(mesh.edges, rho, count, breaks)
     new = dataclasses.replace(problem, edges=edges, scales=scales, period_scale=period_scale, _memo={})
-    if tangent is not None:
-        tangent = Tangent(mesh.transfer(tangent.u, new.mesh), tangent.parameter, tangent.weight)
-    return new, mesh.transfer(u, new.mesh), tangent
+    if tangent is None:
+        return new, mesh.transfer(new.mesh, u)[0], None
+    moved_u, moved_t = mesh.transfer(new.mesh, u, tangent.u)
+    return new, moved_u, Tangent(moved_t, tangent.parameter, tangent.weight)
 
 
 def _wanted_intervals(problem: Collocation, error: float) -> int:

@@ -32,10 +32,16 @@ class OrbitMesh:
     span: float
     own: int
 
-    @property
+    @cached_property
     def intervals(self) -> int:
         """N."""
         return len(self.edges) - 1
+
+    @cached_property
+    def _parts(self) -> tuple[int, int, tuple[int, int], tuple[int, int]]:
+        """End of the nodes, end of the stages, and the shapes of both."""
+        N, n, m = self.intervals, self.n, self.degree
+        return (N + 1) * n, (N + 1) * n + N * m * n, (N + 1, n), (N, m * n)
 
     @cached_property
     def rule(self) -> GaussRule:
@@ -60,65 +66,54 @@ class OrbitMesh:
     @cached_property
     def size(self) -> int:
         """Length of u."""
-        return (self.intervals + 1) * self.n + self.intervals * self.degree * self.n + self.own
+        return self._parts[1] + self.own
 
     def split(self, u: Array) -> tuple[Array, Array, Array]:
         """Views: nodes (N + 1, n), stages (N, m n), rest (own,)."""
-        first = (self.intervals + 1) * self.n
-        last = first + self.intervals * self.degree * self.n
-        stages = u[first:last].reshape(self.intervals, self.degree * self.n)
-        return u[:first].reshape(self.intervals + 1, self.n), stages, u[last:]
+        first, last, nodes, stages = self._parts
+        return u[:first].reshape(nodes), u[first:last].reshape(stages), u[last:]
 
     def join(self, nodes: Array, stages: Array, rest: Array | float = 0.0) -> Array:
         """u from its parts."""
-        u = np.empty(self.size)
-        a, b, c = self.split(u)
-        a[:], b[:], c[:] = nodes, np.reshape(stages, b.shape), rest
+        first, last, _, _ = self._parts
+        u = np.empty(last + self.own)
+        u[:first], u[first:last], u[last:] = nodes.ravel(), stages.ravel(), rest
         return u
 
     def polynomial(self, nodes: Array, stages: Array) -> Array:
         """Values (N, m + 1, n) at the local abscissae (0, c_1, .., c_m)."""
-        inner = stages.reshape(self.intervals, self.degree, self.n)
-        return np.concatenate([nodes[:-1, None, :], inner], axis=1)
-
-    def evaluate(self, nodes: Array, stages: Array, s: Array) -> Array:
-        """The collocation polynomial at any s (K,) in [0, 1]: (K, n)."""
-        piece = np.clip(np.searchsorted(self.edges, s, side="right") - 1, 0, self.intervals - 1)
-        local = (s - self.edges[piece]) / self.h[piece]
-        basis = lagrange_matrix(self.rule.abscissae, local)
-        return np.asarray(np.einsum("ki,kin->kn", basis, self.polynomial(nodes, stages)[piece]))
+        out = np.empty((self.intervals, self.degree + 1, self.n))
+        out[:, 0], out[:, 1:] = nodes[:-1], stages.reshape(self.intervals, self.degree, self.n)
+        return out
 
     def leading(self, nodes: Array, stages: Array) -> Array:
         """(N, n): the m-th derivative over m! of the polynomial with respect to s."""
-        values = np.einsum("i,jin->jn", self.rule.leading, self.polynomial(nodes, stages))
+        values = self.rule.leading @ self.polynomial(nodes, stages)
         return np.asarray(values / (self.h**self.degree)[:, None])
 
-    def transfer(self, u: Array, other: OrbitMesh) -> Array:
-        """u of this mesh as a vector of `other` (same n, span and own)."""
-        nodes, stages, rest = self.split(u)
-        new_nodes = self.evaluate(nodes, stages, other.edges)
-        new_nodes[-1] = nodes[-1]
-        return other.join(new_nodes, self.evaluate(nodes, stages, other.points.ravel()), rest)
-
-    def with_edges(self, edges: Array) -> OrbitMesh:
-        """The same discretisation on another mesh."""
-        return OrbitMesh(np.asarray(edges, float), self.degree, self.n, self.span, self.own)
-
-    def with_degree(self, degree: int) -> OrbitMesh:
-        """Another degree on the same mesh."""
-        return OrbitMesh(self.edges, degree, self.n, self.span, self.own)
+    def transfer(self, other: OrbitMesh, *vectors: Array) -> list[Array]:
+        """Vectors u of this mesh as vectors of `other` (same n, span and own)."""
+        s = np.concatenate([other.edges, other.points.ravel()])
+        piece = np.clip(np.searchsorted(self.edges, s, side="right") - 1, 0, self.intervals - 1)
+        basis = lagrange_matrix(self.rule.abscissae, (s - self.edges[piece]) / self.h[piece])[:, None, :]
+        out = []
+        for u in vectors:
+            nodes, stages, rest = self.split(u)
+            values = (basis @ self.polynomial(nodes, stages)[piece])[:, 0]
+            values[other.intervals] = nodes[-1]
+            out.append(other.join(values[: other.intervals + 1], values[other.intervals + 1 :], rest))
+        return out
 
     @cached_property
     def raised(self) -> tuple[OrbitMesh, Array]:
         """The mesh of degree m + 1 and the matrix (m + 1, m + 1) from polynomial values to its stage values."""
-        higher = self.with_degree(self.degree + 1)
+        higher = OrbitMesh(self.edges, self.degree + 1, self.n, self.span, self.own)
         return higher, lagrange_matrix(self.rule.abscissae, higher.rule.points)
 
     def raise_degree(self, nodes: Array, stages: Array) -> Array:
         """Stage values (N, (m + 1) n) of the same polynomial on the mesh of degree m + 1."""
         matrix = self.raised[1]
-        values = np.einsum("ik,jkn->jin", matrix, self.polynomial(nodes, stages))
-        return np.ascontiguousarray(values.reshape(self.intervals, -1))
+        return (matrix @ self.polynomial(nodes, stages)).reshape(self.intervals, -1)
 
     def quadrature(self, scales: Array) -> Array:
         """(N, m n) weights h_j b_i / scale^2 of the inner product, at the stages."""
