@@ -33,7 +33,7 @@ _ADAPT_EVERY = 3
 _GROWTH = 1e6
 _STALL_POINTS, _STALL, _STALL_LENGTH = 30, 1e-8, 0.05
 _DIP = 0.15
-_PATIENCE = 8
+_PATIENCE = 6
 
 
 class Entry(NamedTuple):
@@ -105,9 +105,12 @@ class Follower(Iterator[Point]):
                 h *= made
                 continue
             found, doubtful = self._bifurcations(self.last, made[0])
-            if not doubtful or doubts >= _PATIENCE or (doubts and not self._hopped(self.last, made[0])):
+            strange = any(f.kind is Kind.UNEXPLAINED for f in found)
+            if not (strange or doubtful) or doubts >= _PATIENCE:
                 return *made, found
-            # a crossing was foretold and is not there: this point may lie on another branch
+            if doubts and not strange and not self._hopped(self.last, made[0]):
+                return *made, found
+            # a crossing was foretold and is not there, or one that nothing explains: is this point on another branch?
             doubts += 1
             h = 0.3 * made[1].distance
         self.status = Status.STEP_TOO_SMALL

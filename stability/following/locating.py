@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 _PAIRS = (Kind.HOPF, Kind.NEIMARK_SACKER)
 _AMBIGUOUS = 10  # halvings after which the simplest explanation of a change is taken
 _EDGE = 1e-6  # how far outside its bracket, in units of the bracket, a located point may lie
+_UNFOLDING = 1e-10  # a perturbed crossing is no branch point: its unfolding parameter is not zero
 _SIGNATURE = 1e-5  # how close to the limit the critical value of a located point must be
 
 
@@ -303,7 +304,7 @@ def _signature(kind: Kind, located: Located, point: Point) -> bool:
     if kind is Kind.FOLD:
         return abs(point.tangent.parameter * point.tangent.weight) < 1e-4
     if kind is Kind.BRANCH_POINT:
-        return abs(float(located.extra[0])) < 1e-6
+        return abs(float(located.extra[0])) < _UNFOLDING
     if kind is Kind.PERIOD_DOUBLING:
         return bool(np.min(np.abs(values - critical.minus)) < allowed) if values.size else False
     extra, paired = float(located.extra[0]), values[values.imag != 0]
