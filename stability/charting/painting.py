@@ -29,7 +29,7 @@ __all__ = ["Picture", "combine", "paint", "worst_error"]
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
 Rows = NDArray[np.intp]
-_BLOCK = 16_384
+_BLOCK = 32_768
 _PLUS, _MINUS, _PAIR = 1, 2, 3
 
 
@@ -101,6 +101,7 @@ def _paint_tile(
     worst = tile.clock_error * 10.0
     size = max(1, _BLOCK // len(x))
     buffers = np.empty((len(columns), size, len(x)))
+    along, weight = np.abs(columns).max(axis=2), np.abs(up)
     painter = _PAINTERS[form]
     for first in range(0, len(y), size):
         rows = slice(first, min(first + size, len(y)))
@@ -109,7 +110,8 @@ def _paint_tile(
             np.dot(up[rows], plane, out=out)
         chi, sigma = (t[rows] if t.shape[0] > 1 else t for t in ticks)
         target = growth[rows], verdict[rows], kind[rows]
-        worst = max(worst, painter(block, chi, sigma, tile.error, neutral, tolerance, target, bulk_only))
+        largest = (weight[rows] @ along.T).max(axis=0)  # of |f|, each function, in this block
+        worst = max(worst, painter(block, largest, chi, sigma, tile.error, neutral, tolerance, target, bulk_only))
     return worst
 
 
@@ -185,10 +187,10 @@ def _encode(verdict: Codes, not_stable: Codes, neutral: bool) -> None:
 
 
 def _paint_hill(
-    f: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
+    f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
     target: tuple[Array, Codes, Codes], bulk_only: bool,
 ) -> float:  # fmt: skip
-    largest = max(float(np.abs(f[i]).max() + np.abs(f[i + 1]).max()) for i in (0, 2)) if bulk_only else _largest(f)
+    largest = float(max(size[0] + size[1], size[2] + size[3]))
     p, m = f[0] * f[1], f[2] * f[3]
     positive, negative = p > 0, m < 0
     np.negative(m, out=m)
@@ -205,26 +207,19 @@ def _paint_hill(
     )  # fmt: skip
 
 
-def _largest(f: Array) -> float:
-    """max(|f0| + |f1|, |f2| + |f3|) bounded by the extremes of each plane."""
-    size = [max(float(plane.max()), -float(plane.min())) for plane in f]
-    return max(size[0] + size[1], size[2] + size[3])
-
-
 def _paint_two(
-    f: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
+    f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
     target: tuple[Array, Codes, Codes], bulk_only: bool,
 ) -> float:  # fmt: skip
     s = 0.25 * f[0] * f[0] + f[1] * f[2]
     inside = s > 0
     positive, negative = inside & (f[3] > 0), inside & (f[3] <= 0)
-    size = [max(float(plane.max()), -float(plane.min())) for plane in f]
 
     def uncertain(rows: Rows, columns: Rows) -> Array:
         a, b, c = (np.abs(plane[rows, columns]) for plane in f[:3])
         return d * (0.5 * a + b + c) + 2.0 * d * d + 4e-16 * (0.25 * a * a + b * c)
 
-    bound = d * (0.5 * size[0] + size[1] + size[2] + 2.0 * d)
+    bound = d * float(0.5 * size[0] + size[1] + size[2] + 2.0 * d)
     return _two_states(
         s, 1.0, positive, negative, uncertain, chi, sigma, neutral, tolerance, target, bulk_only, bound
     )  # fmt: skip

@@ -23,7 +23,7 @@ _MOST_REFINED = 4096  # points of one block that are done again
 
 
 def paint_reciprocal(
-    f: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
+    f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
     target: tuple[Array, Codes, Codes], bulk_only: bool,
 ) -> float:  # fmt: skip
     """Four states, reciprocal polynomial."""
@@ -50,7 +50,7 @@ def paint_reciprocal(
 
 
 def paint_four(
-    f: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
+    f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
     target: tuple[Array, Codes, Codes], bulk_only: bool,
 ) -> float:  # fmt: skip
     """Four states, any polynomial of determinant 1."""
@@ -84,7 +84,7 @@ def paint_four(
 
 
 def paint_matrix(
-    f: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
+    f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
     target: tuple[Array, Codes, Codes], bulk_only: bool,
 ) -> float:  # fmt: skip
     """Any number of states: eigenvalues of M0 at every point; their condition at every 64th (at all, bulk only)."""
