@@ -33,12 +33,12 @@ def rows(data: dict[str, Any]) -> list[tuple[str, str]]:
     chart = data["chart"]
     unstable = np.mean(chart.verdict == "unstable")
     table = [
-        ("growth rate at 1000 x 1000 points", f"{data['seconds']:.2f} s, error <= {float(np.max(chart.error)):.1e}"),
+        ("growth rate at 1000 x 1000 points, first call", f"{data['seconds']:.2f} s, error <= {float(np.max(chart.error)):.1e}"),
         ("unstable part of the chart", f"{unstable:.2%}"),
     ]
     for tip in sorted(chart.tips, key=lambda tip: tip.order):
-        first = f"   (averaging: b = {2 * DELTA:g} at a = 0.25)" if tip.order == 1 else ""
-        table.append((f"tongue {tip.order} opens at", f"b = {tip.y:.10f}, a = {tip.x:.10f}{first}"))
+        first = f"   (averaging: a = 0.25, b = {2 * DELTA:g})" if tip.order == 1 else ""
+        table.append((f"tongue {tip.order} opens at", f"a = {tip.x:.10f}, b = {tip.y:.10f}{first}"))
     return table
 
 
