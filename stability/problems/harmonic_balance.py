@@ -1,0 +1,374 @@
+r"""Periodic orbits by harmonic balance: `HarmonicBalance`.
+
+    x(t) = w t/T + a_0 + sum_(k=1..H) ( a_k cos k omega t + b_k sin k omega t ),      omega = 2 pi / T,
+
+put into x' = f(t, x, p) and projected on the same 2H + 1 functions (Galerkin). Forced systems: T = k T_f(p), k the
+`subharmonic`, so that harmonic k of the orbit is the forcing; autonomous ones: T is an unknown, with the integral phase
+condition. Velocities that are exactly x' = v are eliminated (harmonic_layout). The projection is computed from N samples
+in time (alternating frequency-time): for polynomials of degree d in the states N > (d + 1) H makes it exact, for other
+terms the aliasing is measured and N grows (harmonic_truncation). The Jacobian is exact (harmonic_linearisation).
+
+Stability: Hill's eigenproblem of the same truncated system, checked against the monodromy matrix along the corrected
+orbit (harmonic_spectrum): folds of the truncated system are changes of its Hill exponents at every H, and a verdict that
+the check does not support is UNDETERMINED.
+
+Inner product: time average of the unknown states over their squared scales. Reference: M. Krack, J. Gross (2019),
+*Harmonic Balance for Nonlinear Vibration Problems*; T. Detroux et al. (2015), CMAME 296, 18-38.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..kernels.fourier import series
+from ..kernels.gauss import gauss_rule
+from ..protocols import Corrected, Spectrum, Tangent
+from .harmonic_layout import HarmonicLayout
+from .harmonic_linearisation import HarmonicLinearisation
+from .harmonic_samples import first_samples
+from .orbits import OrbitDiscretisation, whole_number, winding_vector
+
+__all__ = ["HarmonicBalance"]
+
+Array = np.ndarray
+_MAX_ITERATIONS = {True: 30, False: 8}
+_DENSE_DEGREE = 9
+_MAX_HARMONICS, _MAX_SAMPLES = 1000, 65536
+
+
+@dataclass(frozen=True, eq=False)
+class HarmonicBalance(OrbitDiscretisation):
+    """Periodic orbits of a system, forced or autonomous, as a continuation problem with Fourier unknowns.
+
+    Parameters
+    ----------
+    system : System
+    harmonics : int
+        Harmonics H >= 1 of the orbit's own period (with subharmonic k: harmonic k is the forcing).
+    subharmonic : int
+        Orbits of k forcing periods. Autonomous systems have no forcing: leave it at 1.
+    samples : int, optional
+        Samples per period N >= 4 H + 2. None: exact for polynomials, and grown by measured aliasing for other terms.
+    adaptive : bool
+        True: harmonics grow and drop so that the estimated error stays below `accuracy`, never below `harmonics`.
+        False: H stays; where the estimated error exceeds `accuracy` a TruncationWarning says how many are missing.
+    accuracy : float
+        Wanted error of the states over their scales; None: 1e-8 where adaptive, else 1e-3.
+    winding : mapping of angle -> whole number of turns per orbit, or array (n,) in radians
+    scales, period_scale : sizes of the states (n,) and of the period; by default 1, then set by `adapt`.
+
+    Raises
+    ------
+    InputError, UnknownNameError
+        Before any computation.
+
+    Notes
+    -----
+    *Accuracy*: `error` solves for the harmonics H + 1 .. 2H that the residual in time asks for, and for what they change
+    below; it is the largest such change of a state over its scale.
+
+    Examples
+    --------
+    >>> import stability as st
+    >>> problem = st.HarmonicBalance(st.models.duffing(xi=0.02, beta=0.001, Omega=0.5), harmonics=7)
+    >>> p = problem.system.parameter_vector()
+    >>> round(problem.view(problem.start(p), p).max["u"], 4)
+    0.3332
+    """
+
+    system: Any
+    harmonics: int = 7
+    subharmonic: int = 1
+    samples: Any = None
+    adaptive: bool = False
+    accuracy: Any = None
+    winding: Any = None
+    scales: Any = None
+    period_scale: float = 1.0
+    fewest: Any = None
+    _memo: dict[str, Any] = field(default_factory=dict, repr=False)
+    _warned: set[str] = field(default_factory=set, repr=False)
+
+    def __post_init__(self) -> None:
+        n = self.system.n
+        for name, high in (("harmonics", _MAX_HARMONICS), ("subharmonic", 64)):
+            object.__setattr__(self, name, whole_number(name, getattr(self, name), 1, high))
+        if self.own and self.subharmonic != 1:
+            raise InputError(
+                f"subharmonic = {self.subharmonic}: '{self.system.name}' is autonomous and has no forcing period to be a "
+                "multiple of; leave subharmonic=1 (a doubled orbit comes from switch at a period doubling)"
+            )
+        fewest = self.harmonics if self.fewest is None else whole_number("fewest", self.fewest, 1, self.harmonics)
+        object.__setattr__(self, "fewest", fewest)
+        accuracy = (1e-8 if self.adaptive else 1e-3) if self.accuracy is None else self.accuracy
+        if not (isinstance(accuracy, (int, float)) and 0 < accuracy < 1):
+            raise InputError(f"accuracy = {self.accuracy!r}: a number between 0 and 1 is needed (1e-8, for example)")
+        object.__setattr__(self, "accuracy", float(accuracy))
+        scales = np.ones(n) if self.scales is None else np.array(self.scales, float)
+        if scales.shape != (n,) or not (scales > 0).all():
+            raise InputError(f"scales must be {n} positive numbers, got {self.scales!r}")
+        scales.setflags(write=False)
+        object.__setattr__(self, "scales", scales)
+        object.__setattr__(self, "winding", winding_vector(self.system, self.winding))
+        least = 4 * self.harmonics + 2
+        object.__setattr__(self, "fixed_samples", self.samples is not None)
+        if self.samples is None:
+            object.__setattr__(self, "samples", first_samples(self.system, self.harmonics, self.subharmonic))
+        else:
+            object.__setattr__(self, "samples", whole_number("samples", self.samples, 1, _MAX_SAMPLES))
+            if self.samples < least:
+                raise InputError(
+                    f"samples = {self.samples}: {self.harmonics} harmonics need at least 4 H + 2 = {least} samples; "
+                    "give more samples or fewer harmonics, or leave samples away"
+                )
+        layout = HarmonicLayout.of(self.flow, n, self.harmonics, self.samples, self.winding)
+        object.__setattr__(self, "layout", layout)
+
+    layout: HarmonicLayout = field(init=False, repr=False)
+    fixed_samples: bool = field(init=False, repr=False)
+
+    # ------------------------------------------------------------------ what the problem is
+    @property
+    def multiple(self) -> int:  # type: ignore[override]
+        """Forcing periods per orbit, the same number as `subharmonic`."""
+        return self.subharmonic
+
+    @cached_property
+    def size(self) -> int:  # type: ignore[override]
+        """Length of u: coefficients (2H + 1, q), and the period of an autonomous orbit."""
+        return self.layout.count * self.layout.q + self.own
+
+    @property
+    def places(self) -> Array:
+        """The samples s."""
+        return self.layout.basis.points
+
+    @cached_property
+    def phase(self) -> Array:
+        """(N,) phases of the forcing at the samples."""
+        return np.mod(self.subharmonic * self.layout.basis.points, 1.0)
+
+    def packed(self, values: Array, period: float) -> Array:
+        """u from states (N, n) at the samples."""
+        return np.append(self.layout.coefficients(values).ravel(), [period] * self.own)
+
+    def coefficients(self, u: Array) -> Array:
+        """(2H + 1, q) of u."""
+        return u[: self.layout.count * self.layout.q].reshape(self.layout.count, self.layout.q)
+
+    @cached_property
+    def weights(self) -> Array:
+        """(N,) time average over squared scales: a_0^2 + sum (a_k^2 + b_k^2) / 2."""
+        mean = np.where(self.layout.basis.k == 0, 1.0, 0.5)[:, None] * self.scales[self.layout.unknowns] ** -2.0
+        return np.append(mean.ravel(), [self.period_scale**-2] * self.own)
+
+    @cached_property
+    def column_sizes(self) -> Array:
+        """(N,) sizes of the unknowns."""
+        return np.append(self.layout.repeated(self.scales[self.layout.unknowns]).ravel(), [self.period_scale] * self.own)
+
+    @cached_property
+    def row_sizes(self) -> Array:
+        """(N,) sizes of the equations: scale times (rate k)^r, with the rate of the problem's own parameters."""
+        period = self.period_scale if self.own else self.orbit_period(self.system.parameter_vector())
+        rate = 2 * np.pi / period
+        order = np.where(self.layout.second, 2, 1)
+        sizes = self.layout.repeated(self.scales[self.layout.unknowns] * rate**order, by_order=True)
+        return np.append(sizes.ravel(), [1.0] * self.own)
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """(size,) k^2 at the coefficients of second order, else 0."""
+        k = self.layout.basis.k[:, None]
+        return np.asarray(np.where(self.layout.second, k * k, 0.0).ravel())
+
+    @cached_property
+    def first_order_entries(self) -> tuple[Array, Array, Array]:
+        """Rows, columns and values of D for the series of first order."""
+        q, H = self.layout.q, self.harmonics
+        series_at = np.flatnonzero(~self.layout.second)
+        k = np.repeat(np.arange(1, H + 1), len(series_at))
+        places = np.tile(series_at, H)
+        cosine, sine = (2 * k - 1) * q + places, 2 * k * q + places
+        return np.concatenate([cosine, sine]), np.concatenate([sine, cosine]), np.concatenate([k, -k]).astype(float)
+
+    @property
+    def spec(self) -> Mapping[str, Any]:
+        """Plain data from which `from_spec` makes an equal problem."""
+        own = {
+            "problem": "HarmonicBalance",
+            "harmonics": self.harmonics,
+            "subharmonic": self.subharmonic,
+            "samples": self.samples,
+            "fixed": self.fixed_samples,
+            "adaptive": self.adaptive,
+            "accuracy": self.accuracy,
+            "winding": self.winding.tolist(),
+            "scales": self.scales.tolist(),
+            "period_scale": self.period_scale,
+            "fewest": self.fewest,
+        }
+        if self.system.function is not None:
+            return {**own, "view_only": True}
+        return {**own, "system": self.system.to_dict()}
+
+    @classmethod
+    def from_spec(cls, spec: Mapping[str, Any]) -> HarmonicBalance:
+        """The problem of a stored description."""
+        from ..systems.system import System
+
+        fields = {k: v for k, v in spec.items() if k not in ("problem", "system", "fixed")}
+        made = cls(System.from_dict(spec["system"]), **fields)
+        object.__setattr__(made, "fixed_samples", bool(spec["fixed"]))
+        return made
+
+    def changed(self, **fields: Any) -> HarmonicBalance:
+        """A copy with other fields; samples follow the harmonics unless they are given or were given by the user."""
+        keep = {"samples": self.samples} if self.fixed_samples or "harmonics" not in fields else {"samples": None}
+        keep["samples"] = max(keep["samples"] or 0, 4 * fields.get("harmonics", self.harmonics) + 2) or None
+        if "harmonics" in fields and not self.fixed_samples:
+            keep["samples"] = None
+        made = dataclasses.replace(self, **{**keep, **fields, "_memo": {}})
+        object.__setattr__(made, "fixed_samples", self.fixed_samples)
+        return made
+
+    # ------------------------------------------------------------------ the Newton solve
+    def linearise(self, u: Array, params: Array) -> HarmonicLinearisation:
+        """The linearisation at (u, params)."""
+        return HarmonicLinearisation(self, np.array(u, float), np.array(params, float))
+
+    def correct(
+        self, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
+    ) -> Corrected:
+        """The bordered Newton solve of `protocols.Problem`."""
+        index, w, size = self.index(free), self.weights, self.size
+        given, given_p = np.array(u, float), np.array(params, float)
+        u, params = given.copy(), given_p.copy()
+        if tangent is not None:
+            u, params[index] = u + ds * tangent.u, params[index] + ds * tangent.parameter
+            row, pull = w * tangent.u, tangent.weight**2 * tangent.parameter
+        border = 0 if tangent is None else 1
+        A, right = np.zeros((size + border, size + border)), np.zeros((size + border, 2))
+        previous, residual, note, iteration = np.inf, np.inf, "no convergence", 0
+        for iteration in range(1, _MAX_ITERATIONS[tangent is None] + 1):
+            if self.own and not u[-1] > 0:
+                note = "the period became negative"
+                break
+            L = HarmonicLinearisation(self, u.copy(), params.copy(), given if self.own else None)
+            residual = L.size_of_residual
+            if not residual < np.inf:
+                note = L.complaint
+                break
+            A[:size, :size] = L.matrix
+            right[:size, 0] = -L.residual
+            column = L.column(free)
+            if tangent is None:
+                right[:size, 1] = -column
+            else:
+                A[:size, size], A[size, :size], A[size, size] = column, row, pull
+                right[size] = ds - row @ (u - given) - pull * (params[index] - given_p[index]), 1.0
+            x = _solved(A, right, self._row_scales(border))
+            if x is None:
+                note = "singular"
+                break
+            step = x[:size, 0]
+            change_l = float(x[-1, 0]) if border else 0.0
+            change = float(np.sqrt(w @ step**2 + ((tangent.weight * change_l) ** 2 if tangent is not None else 0.0)))
+            length = float(np.sqrt(w @ u**2))
+            damping = 1.0
+            if tangent is None and change > 0.5 * (1 + length):
+                damping = 0.5 * (1 + length) / change
+            if self.own and step[-1] < -0.5 * u[-1]:
+                damping = min(damping, -0.5 * u[-1] / step[-1])
+            u, params[index] = u + damping * step, params[index] + damping * change_l
+            if change <= tolerance * (1 + length):
+                return self._corrected(u, params, x, tangent, residual, iteration, L, A)
+            if tangent is not None and iteration > 1 and change > 2 * previous:
+                break
+            previous = change
+        return Corrected(u, params, None, residual, iteration, 0, None, False, note)
+
+    def _row_scales(self, border: int) -> Array:
+        known = self._memo.get("rows")
+        if known is None:
+            known = self._memo["rows"] = (1.0 / np.append(self.row_sizes, 1.0))[:, None]
+        return known if border else known[:-1]
+
+    def _corrected(
+        self, u: Array, params: Array, x: Array, tangent: Tangent | None, residual: float, iterations: int,
+        L: HarmonicLinearisation, A: Array,
+    ) -> Corrected:  # fmt: skip
+        w = self.weights
+        if tangent is None:
+            new = Tangent(x[:, 1].copy(), 1.0, 1.0)
+        else:
+            t, k = x[: self.size, 1], float(x[-1, 1])
+            length = float(np.sqrt(w @ t**2 + (tangent.weight * k) ** 2))
+            new = Tangent(t / length, k / length, tangent.weight)
+            A[-1, :-1], A[-1, -1] = w * new.u, tangent.weight**2 * new.parameter
+            self._memo["tangent"] = (u, L.u, new)
+        sign = int(np.linalg.slogdet(A * self._row_scales(0 if tangent is None else 1))[0])
+        return Corrected(u, params, new, residual, iterations, sign, L, True)
+
+    # ------------------------------------------------------------------ spectrum, error, adaption
+    def spectrum(self, linearisation: HarmonicLinearisation) -> Spectrum:
+        """Hill multipliers, their error by the monodromy along the corrected orbit, counts, verdict."""
+        from .harmonic_spectrum import checked_spectrum
+
+        return checked_spectrum(linearisation)
+
+    def error(self, u: Array, params: Array) -> float:
+        """Largest change of a state over its scale that the harmonics H + 1 .. 2H would make; inf: unknown."""
+        from .harmonic_truncation import correction
+
+        return correction(self.linearise(u, params)).error
+
+    def adapt(
+        self, u: Array, params: Array, tangent: Tangent | None
+    ) -> tuple[HarmonicBalance, Array, Tangent | None] | None:
+        """More or fewer harmonics, more samples, better scales (see harmonic_truncation), or None."""
+        from .harmonic_truncation import adapted
+
+        return adapted(self, u, params, tangent)
+
+    def doubled(self, u: Array, params: Array, vector: Array) -> tuple[HarmonicBalance, Array, Array]:
+        """The problem of twice the period, the orbit run through twice, and the antiperiodic direction."""
+        from .harmonic_switching import doubled_problem
+
+        return doubled_problem(self, u, params, vector)
+
+    def pieces(self, u: Array, params: Array) -> tuple[int, Array, Array, float]:
+        """The series on 2H pieces, or more, as polynomials of degree 9."""
+        period = float(u[-1]) if self.own else self.orbit_period(params)
+        count = max(2 * self.harmonics, 8)
+        edges = np.arange(count + 1) / count
+        local = gauss_rule(_DENSE_DEGREE).abscissae
+        at = (edges[:-1, None] + local / count).ravel()
+        values = self.layout.states(self.coefficients(u), 2 * np.pi / period, at)
+        return _DENSE_DEGREE, edges, values.reshape(count, len(local), self.layout.n), period
+
+    def harmonic(self, u: Array, state: str) -> Array:
+        """(H + 1,) complex Fourier coefficients c_k of an unknown state, x = sum c_k exp(2 pi i k s) + conjugate."""
+        names = [self.system.states[k] for k in self.layout.unknowns]
+        if state not in names:
+            from ..errors import unknown_name
+
+            raise unknown_name("unknown series", state, names, "this problem")
+        c = self.coefficients(u)[:, names.index(state)]
+        return np.concatenate([c[:1].astype(complex), 0.5 * (c[1::2] - 1j * c[2::2])])
+
+
+def _solved(A: Array, right: Array, scales: Array) -> Array | None:
+    """A x = right with scaled rows; None where A is singular or the result not finite."""
+    try:
+        x = np.linalg.solve(A * scales, right * scales)
+    except np.linalg.LinAlgError:
+        return None
+    return x if np.isfinite(x).all() else None

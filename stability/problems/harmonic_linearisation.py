@@ -1,0 +1,229 @@
+r"""The linearisation of a harmonic-balance problem: residual, exact Jacobian, bordered solves, gradients.
+
+Residual of series k, with r_k = 2 or 1 its order and D the derivative by theta,
+
+    R_k = omega^r D^r c_k - G+ f_row(k)(X),      X = X(c, omega)      (see harmonic_layout),
+
+exact Jacobian from one call of the evaluator at all samples (J = f_x, Fp = f_p at fixed phase):
+
+    dR_k/dc_j = delta_kj omega^r D^r - T(J_(k, x_j)) - omega T(J_(k, v_j)) D,
+    dR/dp = - G+ Fp + (dR/domega) (domega/dp),      omega = 2 pi / T(p)   (autonomous: T is the last unknown).
+
+So a forcing amplitude that depends on its frequency (base excitation) is inside Fp. The core is the whole scaled
+Jacobian; gradients of w^T S v and w^T M v follow from second directional derivatives at the samples, with the adjoint
+W(t) of w: w^T G+ f = sum_i W_i . f_i. References: Detroux, Renson, Masset, Kerschen (2015), CMAME 296, 18-38.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..kernels.fourier import derivative
+
+if TYPE_CHECKING:
+    from .harmonic_balance import HarmonicBalance
+
+__all__ = ["HarmonicLinearisation"]
+
+Array = np.ndarray
+
+
+class HarmonicLinearisation:
+    """F, F_u and spectral data at (u, p); see `protocols.Linearisation`."""
+
+    def __init__(self, problem: HarmonicBalance, u: Array, params: Array, reference: Array | None = None) -> None:
+        layout = problem.layout
+        self.problem, self.u, self.params = problem, u, params
+        self.reference = reference
+        size = layout.count * layout.q
+        self.c = u[:size].reshape(layout.count, layout.q)
+        self.period = float(u[-1]) if problem.own else problem.orbit_period(params)
+        self.omega = 2 * np.pi / self.period
+        self.X = layout.states(self.c, self.omega)
+        self.F, self.J, self.Fp = problem.evaluations.FJP(problem.phase, self.X, params)
+
+    # ------------------------------------------------------------------ residual
+    def _linear(self, c: Array, omega: float, power: int = 0) -> Array:
+        """omega^r D^r c (2H + 1, q), or its derivative by omega (`power` 1: r omega^(r-1)), winding included."""
+        layout = self.problem.layout
+        second = omega * omega if power == 0 else 2 * omega
+        first = omega if power == 0 else 1.0
+        k = layout.basis.k[:, None]
+        if layout.all_second:
+            return -second * k * k * c
+        slope = derivative(c)
+        if layout.turn is not None:
+            slope[0] += layout.turn / (2 * np.pi)
+        return np.where(layout.second, -second * k * k * c, first * slope)
+
+    @cached_property
+    def residual(self) -> Array:
+        """F(u, p), (N,)."""
+        layout = self.problem.layout
+        values = self._linear(self.c, self.omega) - layout.basis.analysis @ self.F[:, layout.rows]
+        if not self.problem.own:
+            return np.asarray(values.ravel())
+        gap = 0.0 if self.reference is None else float(self.phase_row @ (self.u - self.reference))
+        return np.append(values.ravel(), gap)
+
+    @property
+    def size_of_residual(self) -> float:
+        """Largest residual over the size of its equation; inf where something is not finite."""
+        value = float(np.abs(self.residual / self.problem.row_sizes).max())
+        return value if np.isfinite(value) else np.inf
+
+    @property
+    def complaint(self) -> str:
+        """Which state is not finite, and where."""
+        bad = np.argwhere(~np.isfinite(self.F))
+        if not len(bad):
+            return "not finite: a derivative or the solution"
+        point, state = bad[0]
+        where = self.problem.layout.basis.points[point]
+        return f"not finite: state {self.problem.system.states[state]} at phase {where:.3g}"
+
+    @cached_property
+    def phase_row(self) -> Array:
+        """(N,) of the phase condition: weights . dc_ref/dtheta, normalised, with the reference orbit (its own if none)."""
+        problem, layout = self.problem, self.problem.layout
+        u = self.u if self.reference is None else self.reference
+        slope = derivative(u[:-1].reshape(layout.count, layout.q))
+        row = problem.weights * np.append(slope.ravel(), 0.0)
+        length = float(np.sqrt((slope.ravel() ** 2 * problem.weights[:-1]).sum()))
+        return np.asarray(row / (length if length > 0 else 1.0))
+
+    # ------------------------------------------------------------------ derivatives
+    @cached_property
+    def products(self) -> Array:
+        """T of all J_(row, state): (2H + 1, 2H + 1, q, n)."""
+        layout = self.problem.layout
+        J = self.J[:, layout.rows].reshape(layout.samples, -1)
+        return np.asarray(layout.basis.multiplication(J).reshape(layout.count, layout.count, layout.q, layout.n))
+
+    @cached_property
+    def matrix(self) -> Array:
+        """F_u, dense (N, N)."""
+        layout, own = self.problem.layout, self.problem.own
+        count, q, omega = layout.count, layout.q, self.omega
+        places, velocities = layout.pairs
+        T = self.products
+        block = T[..., layout.unknowns]
+        through = layout.basis.times_derivative(T[..., velocities])
+        through *= omega
+        if layout.all_second:
+            block += through
+        else:
+            block[..., places] += through
+        size = count * q
+        A = np.empty((size + own, size + own))
+        A[:size, :size] = block.transpose(0, 2, 1, 3).reshape(size, size)
+        np.negative(A[:size, :size], out=A[:size, :size])
+        if own:
+            A[:size, size] = self._omega_column * (-omega / self.period)
+            A[size] = self.phase_row
+        diagonal = A.reshape(-1)[: size * (size + own) : size + own + 1]
+        diagonal -= self.problem.stiffness * (omega * omega)
+        if not layout.all_second:
+            rows, columns, values = self.problem.first_order_entries
+            A[rows, columns] += omega * values
+        return A
+
+    @cached_property
+    def _omega_column(self) -> Array:
+        """dR/domega at fixed coefficients, (size,)."""
+        layout = self.problem.layout
+        places, velocities = layout.pairs
+        values = self._linear(self.c, self.omega, 1)
+        if len(velocities):
+            part = np.einsum("kij,kj->ki", self.J[:, layout.rows][:, :, velocities], self.X[:, velocities])
+            values = values - layout.basis.analysis @ (part / self.omega)
+        return np.asarray(values.ravel())
+
+    @cached_property
+    def omega_slopes(self) -> Array:
+        """domega/dp, (m,): zero for autonomous systems."""
+        problem = self.problem
+        if problem.own:
+            return np.zeros(len(self.params))
+        gradient = problem.multiple * problem.evaluations.period_gradient(self.params)
+        return np.asarray(-self.omega / self.period * gradient)
+
+    def column(self, name: str) -> Array:
+        """dF/dp_name, (N,)."""
+        problem, layout = self.problem, self.problem.layout
+        index = problem.index(name)
+        values = -(layout.basis.analysis @ self.Fp[:, layout.rows, index]).ravel()
+        rate = self.omega_slopes[index]
+        if rate != 0.0:
+            values = values + rate * self._omega_column
+        return np.append(values, 0.0) if problem.own else np.asarray(values)
+
+    # ------------------------------------------------------------------ solving
+    def solve(self, rows: Array, columns: Array, corner: Array, right_sides: Array) -> Array:
+        """Solve [[F_u, columns], [rows, corner]] x = right_sides; singular: non-finite numbers."""
+        N, extra = self.matrix.shape[0], columns.shape[1]
+        full = np.empty((N + extra, N + extra))
+        full[:N, :N] = self.matrix
+        full[:N, N:], full[N:, :N], full[N:, N:] = columns, rows, corner
+        sizes = np.abs(full).max(axis=1)
+        if not (sizes.min() > 0 and np.isfinite(sizes.max())):
+            return np.full(right_sides.shape, np.nan)
+        full /= sizes[:, None]
+        try:
+            return np.asarray(np.linalg.solve(full, right_sides / sizes[:, None]))
+        except np.linalg.LinAlgError:
+            return np.full(right_sides.shape, np.nan)
+
+    def determinant_sign(self, column: Array, border: Array | None) -> int:
+        """Sign of det F_u, or of the matrix bordered by the column and the tangent."""
+        full = self.matrix
+        if border is not None:
+            full = np.block([[full, column[:, None]], [border[None]]])
+        return int(np.linalg.slogdet(full)[0])
+
+    # ------------------------------------------------------------------ core: the scaled Jacobian
+    @cached_property
+    def core(self) -> Array:
+        """S = rows^-1 F_u columns, (N, N)."""
+        problem = self.problem
+        return np.asarray(self.matrix * problem.column_sizes / problem.row_sizes[:, None])
+
+    def core_column(self, name: str) -> Array:
+        """s_name, (N,)."""
+        return self.column(name) / self.problem.row_sizes
+
+    def embed(self, w: Array) -> Array:
+        """(N,): w in units of the equations."""
+        return np.asarray(self.problem.row_sizes * w)
+
+    def lift(self, v: Array, free: str | None = None) -> Array:
+        """(N,): v in units of the unknowns."""
+        return np.asarray(self.problem.column_sizes * v[: self.u.size])
+
+    # ------------------------------------------------------------------ spectral matrix
+    @cached_property
+    def modes(self) -> Any:
+        """Hill's eigenvalue problem of the truncated system, solved whole (see harmonic_spectrum)."""
+        from .harmonic_spectrum import hill_modes
+
+        return hill_modes(self)
+
+    @property
+    def spectral(self) -> Array:
+        """M (n, n): real monodromy matrix whose eigenvalues are the Hill multipliers of the truncated system."""
+        return np.asarray(self.modes.monodromy)
+
+    def spectral_gradient(self, w: Array, v: Array) -> tuple[Array, Array]:
+        """Gradient of w^T M v by u and by p."""
+        from .harmonic_gradient import spectral_gradient
+
+        return spectral_gradient(self, np.asarray(w), np.asarray(v))
+
+    def core_gradient(self, w: Array, v: Array, free: str) -> tuple[Array, Array]:
+        """Gradient of w^T [S, s_free] v by u and by p."""
+        from .harmonic_gradient import core_gradient
+
+        return core_gradient(self, np.asarray(w), np.asarray(v), self.problem.index(free))
