@@ -81,6 +81,6 @@ def averaged_equilibrium(system: System, mean: sp.Matrix, start: npt.NDArray[np.
         if np.abs(step).max() <= 1e-14 * max(1.0, float(np.abs(x).max())) or (iteration > 40 and not step.any()):
             return {s: float(v) if abs(v) > 1e-300 else 0.0 for s, v in zip(system.states, x)}
     raise ConvergenceError(
-        f"no equilibrium of '{system.name}' from {dict(zip(system.states, start.tolist()))}; give another about=dict(...)",
+        f"no equilibrium of '{system.name}' from {dict(zip(system.states, start.tolist()))}; give another about=",
         last=x, iterations=iteration + 1,
     )  # fmt: skip

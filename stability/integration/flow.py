@@ -61,7 +61,9 @@ class Flow:
         return np.asarray(out.T.reshape(len(self.x), *np.shape(t)))
 
 
-def pieces(compiled: CompiledField, t0: float, t1: float, period: float, breaks: Array) -> Iterator[tuple[float, float]]:
+def pieces(
+    compiled: CompiledField, t0: float, t1: float, period: float, breaks: Array
+) -> Iterator[tuple[float, float]]:
     """[t0, t1] cut at the breaks (phases) of a forced field."""
     if not len(breaks):
         yield t0, t1
@@ -156,7 +158,7 @@ def _clock(compiled: CompiledField, params: Array, which: list[int]) -> tuple[fl
 def _failure(system: Any, status: int, t: float, x: Array, steps: int) -> Exception:
     state = ", ".join(f"{name} = {value:.4g}" for name, value in zip(system.states, x))
     if status == runge_kutta.NOT_FINITE:
-        return NonFiniteError(f"the solution of '{system.name}' leaves the finite range at t = {t:.6g}; last state {state}")
+        return NonFiniteError(f"the solution of '{system.name}' is no longer finite at t = {t:.6g}; last state {state}")
     what = "needs too many steps" if status == runge_kutta.TOO_MANY_STEPS else "needs a step below rounding"
     return ConvergenceError(
         f"the integration of '{system.name}' {what} at t = {t:.6g}, {state}; loosen rtol and atol, or look for a jump "

@@ -1,8 +1,8 @@
 """Guarded on-disk caching of compiled kernels.
 
 numba keeps compiled functions in an index file and one data file per signature. A damaged entry (a full disk, a killed
-process, a copied home directory) makes numba raise from the middle of a call, or even from an import. Here a kernel that
-cannot be loaded from its cache has the cache files deleted and is compiled again; if the cache directory cannot be
+process, a copied home directory) makes numba raise from the middle of a call, or even from an import. Here a kernel
+that cannot be loaded from its cache has the cache files deleted and is compiled again; if the cache directory cannot be
 written, the kernel is compiled without a cache. A kernel is therefore never lost to its cache: it only becomes slower
 to get.
 """
@@ -21,7 +21,8 @@ from numba.core.caching import FunctionCache
 __all__ = ["kernel"]
 
 _EVERYTHING_A_DAMAGED_FILE_RAISES = (
-    EOFError, OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, ImportError, RuntimeError, MemoryError,
+    EOFError, OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, ImportError, RuntimeError,
+    MemoryError,
 )  # fmt: skip
 
 
@@ -48,7 +49,7 @@ class _GuardedCache(FunctionCache):
         folder, prefix = self._impl.locator.get_cache_path(), self._impl.filename_base
         with contextlib.suppress(OSError):
             for name in os.listdir(folder):
-                if name.startswith(prefix + ".") or name.startswith(prefix + "-"):
+                if name.startswith((prefix + ".", prefix + "-")):
                     with contextlib.suppress(OSError):
                         os.unlink(os.path.join(folder, name))
 
@@ -61,7 +62,7 @@ def _unpickling_errors() -> tuple[type[Exception], ...]:
 
 
 def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) -> Any:
-    """Decorator: a compiled kernel with a guarded disk cache (`error_model="numpy"`: division by zero gives inf or nan).
+    """Decorator: a compiled kernel with a guarded disk cache (`error_model="numpy"`: 1/0 is inf or nan).
 
     `inline=True` is for small functions that are only called by other kernels: no cache file of their own.
     """

@@ -8,7 +8,7 @@ On scaled time s in [0, 1], t = sigma s, sigma = span T: the discretised problem
     phase   <x_ref', Y - Y_ref> = 0                    autonomous systems only, whose unknown is the period T
     arc     <t, (u, lambda) - (u_0, lambda_0)> = ds    where a tangent is given
 
-The stages are Gauss points, so each inner product is an exact quadrature: sum weights . . with weights h_j b_i / scale^2.
+The stages are Gauss points, so each inner product is an exact quadrature with the weights h_j b_i / scale^2.
 Forced systems (`period` address not 0): T = T(p) with its gradient, so the parameter derivative at fixed phase is
 -h (sigma f_p + span T_p f).
 """
@@ -125,7 +125,8 @@ def newton(  # type: ignore[no-untyped-def]
     """Correct (nodes, Y, T, P[free]) in place; `arc` = 1 with a tangent, 0 without (then P stays fixed).
 
     Returns (status, iterations, residual, sign, du, dY, dl, tangent of T, tangent of P[free]): du, dY, dl hold the last
-    correction [0] and the tangent of the curve [1], not normalised; without `arc` the derivative by P[free]. F, J, Fp, dT, LU, pivots, Z, M hold the last linearisation.
+    correction [0] and the tangent of the curve [1], not normalised; without `arc` the derivative by P[free].
+    F, J, Fp, dT, LU, pivots, Z, M hold the last linearisation.
     """
     intervals, size = Y.shape
     n = nodes.shape[1]

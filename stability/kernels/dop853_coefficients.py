@@ -1,4 +1,4 @@
-"""Coefficients of the Dormand-Prince method of order 8 with embedded errors of order 5 and 3 and dense output of order 7.
+"""Coefficients of the Dormand-Prince method of order 8 with embedded errors of orders 5 and 3, dense output of order 7.
 
 Row i of A holds the weights of stages 0 .. i-1 (only non-zero entries are listed); stages 12 .. 15 serve the dense
 output (12 is the derivative at the end of the step). The order conditions are checked in the tests.
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-__all__ = ["A", "B", "C", "D", "E3", "E5", "STAGES", "WITH_DENSE"]
+__all__ = ["E3", "E5", "STAGES", "WITH_DENSE", "A", "B", "C", "D"]
 
 STAGES, WITH_DENSE = 12, 16
 

@@ -89,7 +89,7 @@ def gauss_rule(degree: int) -> GaussRule:
     array([[2.]])
     """
     if not 1 <= int(degree) <= 12:
-        raise InputError(f"degree = {degree}: the collocation degree must be an integer from 1 to 12 (5 is the default)")
+        raise InputError(f"degree = {degree}: the collocation degree must be an integer from 1 to 12 (default 5)")
     nodes, weights = np.polynomial.legendre.leggauss(int(degree))
     c, b = (nodes + 1) / 2, weights / 2
     size = len(c)

@@ -74,7 +74,7 @@ def _error(K, h, z, new, rtol, atol, n):  # type: ignore[no-untyped-def]
         total = five + 0.01 * three
         if total > 0.0:
             worst = max(worst, abs(h) * five / np.sqrt(total * count))
-        elif not total == 0.0:
+        elif total != 0.0:
             return np.nan
     return worst
 
@@ -118,7 +118,8 @@ def integrate(field, P, sigma, phase0, rate, s, end, z, which, sigma_p, rtol, at
                     for j in range(i):
                         value += _A[i, j] * K[j, a, k]
                     work[a, k] = z[a, k] + h * value
-            _slope(field, P, sigma, phase0, rate, low, high, s + _C[i] * h, work, n, which, sigma_p, F, J, Fp, x, phase, K[i])
+            _slope(field, P, sigma, phase0, rate, low, high, s + _C[i] * h, work, n, which, sigma_p, F, J, Fp, x, phase,
+                   K[i])  # fmt: skip
         for a in range(n):
             for k in range(columns):
                 value = 0.0
@@ -146,8 +147,8 @@ def integrate(field, P, sigma, phase0, rate, s, end, z, which, sigma_p, rtol, at
                         for a in range(n):
                             more_c[q, r, a] = coefficients[q, r, a]
                 times, coefficients = more_t, more_c
-            _keep(field, P, sigma, phase0, rate, low, high, s, h, z, new, n, which, sigma_p, F, J, Fp, x, phase, work, K,
-                  coefficients[steps])  # fmt: skip
+            _keep(field, P, sigma, phase0, rate, low, high, s, h, z, new, n, which, sigma_p, F, J, Fp, x, phase, work,
+                  K, coefficients[steps])  # fmt: skip
             times[steps + 1] = s + h
         steps += 1
         finished = h == end - s
@@ -177,7 +178,8 @@ def _keep(field, P, sigma, phase0, rate, low, high, s, h, z, new, n, which, sigm
                 for j in range(i):
                     value += _A[i, j] * K[j, a, k]
                 work[a, k] = z[a, k] + h * value
-        _slope(field, P, sigma, phase0, rate, low, high, s + _C[i] * h, work, n, which, sigma_p, F, J, Fp, x, phase, K[i])
+        _slope(field, P, sigma, phase0, rate, low, high, s + _C[i] * h, work, n, which, sigma_p, F, J, Fp, x, phase,
+               K[i])  # fmt: skip
     for a in range(n):
         change = new[a, 0] - z[a, 0]
         out[0, a] = z[a, 0]

@@ -2,8 +2,9 @@ r"""Periodic orbits by Gauss collocation with condensation: `Collocation`.
 
     x' = sigma f(phase, x, p) on s in [0, 1],      x(1) = S x(0) + w,      sigma = span T,
 
-forced systems: T = T(p) is the forcing period, phase = frac(span s), span = k for orbits of k forcing periods (k/2 where
-x(t + k T/2) = S x(t)); autonomous systems: T is the orbit's own period, an unknown, with an integral phase condition.
+forced systems: T = T(p) is the forcing period, phase = frac(span s), span = k for orbits of k forcing periods (k/2
+where x(t + k T/2) = S x(t)); autonomous systems: T is the orbit's own period, an unknown, with an integral phase
+condition.
 Polynomials of degree m on N intervals through the Gauss points (order 2m at the nodes); each Newton solve is one
 compiled call (kernels/condensation_newton.py), from which the tangent, the determinant sign and the monodromy matrix
 fall out. The error is estimated by one Newton step at degree m + 1 from the same orbit, which gives the change of the

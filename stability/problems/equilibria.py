@@ -413,7 +413,7 @@ class Equilibrium:
         return dataclasses.replace(self, scales=np.where(sizes > 1e-12, np.abs(sizes), self.scales))
 
     def adapt(self, u: Array, params: Array, tangent: Tangent) -> tuple[Equilibrium, Array, Tangent] | None:
-        """New scales at the first call, and when a state has outgrown its own by a factor of two (it is then doubled again)."""
+        """New scales at the first call, and when a state has outgrown its own twice (it is then doubled again)."""
         if not self.following:
             return None
         s = self.scales

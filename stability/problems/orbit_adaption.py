@@ -5,8 +5,8 @@ The error of the nodes goes like N^(-2m); the wanted `accuracy` gives the number
     N_new = N (safety . error / accuracy)^(1 / 2m),
 
 limited to a factor between 2/3 and 2, with a dead band so that the mesh rests while the error is between 1e-5 and 1
-times the accuracy. The intervals are placed by equidistribution (kernels/meshes.py) when the error per interval is uneven.
-Scales are the largest moduli of the states on the orbit, kept within a factor of 2 of them.
+times the accuracy. The intervals are placed by equidistribution (kernels/meshes.py) when the error per interval is
+uneven. Scales are the largest moduli of the states on the orbit, kept within a factor of 2 of them.
 """
 
 from __future__ import annotations

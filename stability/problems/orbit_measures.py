@@ -1,6 +1,7 @@
 """What is recorded of an orbit at every point of a branch, and the orbit a user sees.
 
-Every discretisation gives its orbit as polynomials on pieces of the period (`pieces`). Extrema are those of the polynomial; <x>.amplitude(1) = 2 |c_1| is the first
+Every discretisation gives its orbit as polynomials on pieces of the period (`pieces`). Extrema are those
+of the polynomial; <x>.amplitude(1) = 2 |c_1| is the first
 harmonic of the orbit's own period, c_1 = int_0^1 x(s) exp(-2 pi i s) ds by Gauss quadrature. An orbit solved on half
 of its period is unfolded by its symmetry first: x(s + 1/2) = S x(s).
 """

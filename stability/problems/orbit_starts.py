@@ -58,7 +58,7 @@ def doubled_problem(problem: Collocation, u: Array, params: Array, vector: Array
     mesh = problem.mesh
     edges = np.concatenate([mesh.edges / 2, 0.5 + mesh.edges[1:] / 2])
     if problem.halved:  # the whole orbit is an orbit of one period without the symmetry's help
-        raise InputError("a doubled orbit starts from the orbit on its whole period: build the problem without symmetry")
+        raise InputError("a doubled orbit starts from the orbit on its whole period: build it without symmetry")
     multiple = problem.multiple if mesh.own else 2 * problem.multiple
     new = dataclasses.replace(
         problem, multiple=multiple, intervals=2 * problem.intervals, edges=edges, winding=2 * problem.winding,
@@ -116,8 +116,8 @@ def _failed(problem: OrbitDiscretisation, params: Array, found: Corrected, what:
     where = ", ".join(f"{k} = {v:g}" for k, v in zip(problem.parameters, params))
     return ConvergenceError(
         f"Newton's method did not reach a periodic orbit of '{problem.system.name}' from {what} ({found.note}; "
-        f"residual {found.residual:.1e}) at {where}; give a state on or near the orbit, an orbit of another method, or start at "
-        "another parameter value",
+        f"residual {found.residual:.1e}) at {where}; give a state near the orbit, an orbit of another method, or start "
+        "at another parameter value",
         residual=found.residual, iterations=found.iterations, u=found.u, params=params,
     )  # fmt: skip
 
@@ -131,7 +131,7 @@ def _from_orbit(problem: OrbitDiscretisation, params: Array, orbit: Any) -> Arra
         wanted = problem.multiple * problem.evaluations.period(params)
         turns = wanted / (period * round(max(1.0, wanted / period)))
         if not 0.5 < turns < 2:
-            raise InputError(f"an orbit of period {period:g} does not fit {problem.multiple} forcing periods, {wanted:g}")
+            raise InputError(f"an orbit of period {period:g} does not fit {problem.multiple} periods, {wanted:g}")
         ratio = period / wanted * max(1, round(wanted / period))
         return _settled(problem, from_function(problem, lambda t: orbit(t * ratio), wanted), params, "the given orbit")
     return _settled(problem, from_function(problem, orbit, period), params, "the given orbit")

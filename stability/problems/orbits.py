@@ -112,7 +112,7 @@ class OrbitDiscretisation:
         raise NotImplementedError
 
     def pieces(self, u: Array, params: Array) -> tuple[int, Array, Array, float]:
-        """(degree d, edges (K + 1,) in [0, 1], values (K, d + 1, n) at (0, Gauss points), period) of the whole orbit."""
+        """(degree d, edges (K + 1,) in [0, 1], values (K, d + 1, n) at (0, Gauss points), period) of the orbit."""
         raise NotImplementedError
 
     # ------------------------------------------------------------------ starts and results

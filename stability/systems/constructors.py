@@ -196,7 +196,9 @@ class Constructors:
         """
         from .functions import function_fields
 
-        common: dict[str, Any] = {"angles": angles, "bounds": bounds, "units": units, "description": description, "breaks": breaks}
+        common: dict[str, Any] = {
+            "angles": angles, "bounds": bounds, "units": units, "description": description, "breaks": breaks,
+        }  # fmt: skip
         return cls(**function_fields(function, states, period, parameters, name, **common))
 
     @classmethod

@@ -1,7 +1,7 @@
 """The linearised equations of a system about a constant state, as a system again.
 
-With x = x_e + y:  y' = [f(t, x_e) - mean part that vanishes] + A(t) y,  A = df/dx (t, x_e). The forcing f(t, x_e) stays,
-so that the linearised system answers the same excitation; the states keep their names and mean the deviation y.
+With x = x_e + y:  y' = [f(t, x_e) - mean part that vanishes] + A(t) y,  A = df/dx (t, x_e). The forcing f(t, x_e)
+stays, so that the linearised system answers the same excitation; the states keep their names and mean the deviation y.
 """
 
 from __future__ import annotations

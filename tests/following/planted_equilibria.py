@@ -52,7 +52,7 @@ def planted_system() -> st.System:
         f[3] + p["k3"] * (f[0] * z3 + z1 * f[2]) + 2 * p["k4"] * z2 * f[1],
     ]
     rhs = tuple(A * sp.Matrix(d))
-    values = {name: 0.0 for name in (*NORMAL, *SHEAR)}
+    values = dict.fromkeys((*NORMAL, *SHEAR), 0.0)
     values |= {str(s): float(i == j) for M in (A, B) for (i, j), s in zip(np.ndindex(N, N), M)}
     names = tuple(str(s) for s in y)
     return st.System(name="planted", coordinates=names, states=names, parameters=values, rhs=rhs)
