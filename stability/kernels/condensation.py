@@ -34,47 +34,73 @@ __all__ = ["condense", "solve_stages", "solve_stages_transposed"]
 def eliminate(T, rows, size, width, swaps):  # type: ignore[no-untyped-def]
     """LU with row interchanges of the first `size` columns of T[:rows], applied to all `width` columns.
 
-    Row interchanges move the multipliers, kept below the diagonal, too (LAPACK's convention); `swaps` (size,) receives
-    the pivot rows. Returns the sign of the product of the pivots and interchanges, 0 where a pivot is zero or not finite.
+    Right-looking, four columns at a time. Row interchanges move the multipliers, kept below the diagonal, too (LAPACK's
+    convention); `swaps` (size,) receives the pivot rows. Returns the sign of the product of the pivots and
+    interchanges, 0 where a pivot is zero or not finite.
     """
     sign = 1.0
-    for p in range(size):
-        best, row = abs(T[p, p]), p
-        for i in range(p + 1, rows):
-            value = abs(T[i, p])
-            if value > best:
-                best, row = value, i
-        swaps[p] = row
-        if not (best > 0.0 and best < np.inf):
-            return 0.0
-        if row != p:
-            sign = -sign
-            for k in range(width):
-                T[p, k], T[row, k] = T[row, k], T[p, k]
-        pivot = T[p, p]
-        if pivot < 0.0:
-            sign = -sign
-        inverse = 1.0 / pivot
-        for i in range(p + 1, rows):
-            factor = T[i, p] * inverse
-            T[i, p] = factor
-            if factor != 0.0:
-                for k in range(p + 1, width):
+    for start in range(0, size, 4):
+        stop = min(start + 4, size)
+        for p in range(start, stop):
+            best, row = abs(T[p, p]), p
+            for i in range(p + 1, rows):
+                value = abs(T[i, p])
+                if value > best:
+                    best, row = value, i
+            swaps[p] = row
+            if not (best > 0.0 and best < np.inf):
+                return 0.0
+            if row != p:
+                sign = -sign
+                for k in range(width):
+                    T[p, k], T[row, k] = T[row, k], T[p, k]
+            if T[p, p] < 0.0:
+                sign = -sign
+            inverse = 1.0 / T[p, p]
+            for i in range(p + 1, rows):
+                factor = T[i, p] * inverse
+                T[i, p] = factor
+                for k in range(p + 1, stop):
                     T[i, k] -= factor * T[p, k]
+        for p in range(start + 1, stop):
+            for i in range(start, p):
+                factor = T[p, i]
+                for k in range(stop, width):
+                    T[p, k] -= factor * T[i, k]
+        if stop == start + 4:
+            for i in range(stop, rows):
+                f, g, h, e = T[i, start], T[i, start + 1], T[i, start + 2], T[i, start + 3]
+                for k in range(stop, width):
+                    T[i, k] -= f * T[start, k] + g * T[start + 1, k] + h * T[start + 2, k] + e * T[start + 3, k]
+        else:
+            for p in range(start, stop):
+                for i in range(stop, rows):
+                    factor = T[i, p]
+                    for k in range(stop, width):
+                        T[i, k] -= factor * T[p, k]
     return sign
 
 
 @kernel(inline=True)
 def back_substitute(T, size, width):  # type: ignore[no-untyped-def]
-    """Solve with the upper triangle of T[:size, :size] for the columns size .. width, in place."""
-    for p in range(size - 1, -1, -1):
-        inverse = 1.0 / T[p, p]
-        for k in range(size, width):
-            T[p, k] *= inverse
-        for i in range(p):
-            factor = T[i, p]
+    """Solve with the upper triangle of T[:size, :size] for the columns size .. width, in place, four rows at a time."""
+    stop = size
+    while stop > 0:
+        start = max(stop - 4, 0)
+        for p in range(stop - 1, start - 1, -1):
+            inverse = 1.0 / T[p, p]
             for k in range(size, width):
-                T[i, k] -= factor * T[p, k]
+                T[p, k] *= inverse
+            for i in range(start, p):
+                factor = T[i, p]
+                for k in range(size, width):
+                    T[i, k] -= factor * T[p, k]
+        if stop - start == 4:
+            for i in range(start):
+                f, g, h, e = T[i, start], T[i, start + 1], T[i, start + 2], T[i, start + 3]
+                for k in range(size, width):
+                    T[i, k] -= f * T[start, k] + g * T[start + 1, k] + h * T[start + 2, k] + e * T[start + 3, k]
+        stop = start
 
 
 @kernel(inline=True)
