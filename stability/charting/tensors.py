@@ -126,15 +126,16 @@ def _clock(values: Array) -> tuple[Array, float]:
 
 def _choose_steps(sampler: Sampler, x: Array, y: Array, target: float) -> tuple[int, float]:
     """Steps for which two successive Richardson values on the sample agree to the target, and their difference."""
-    steps = 16
+    steps, error = 16, np.inf
     before = sampler.fields(x, y, steps)
     while True:
-        steps *= 2
+        ratio = 2.0 if not np.isfinite(error) else (error / (0.1 * target)) ** 0.125
+        old, steps = steps, 2 * int(np.ceil(0.5 * steps * min(2.0, max(1.3, ratio))))
         now = sampler.fields(x, y, steps)
         scale = np.maximum(1.0, np.abs(now).max(axis=0))
-        error = float((np.abs(now - before).max(axis=0) / scale).max()) / 255.0
-        # the difference measures the coarser value; the finer one is 2^8 times better
-        if error <= 0.2 * target or steps >= _MAX_STEPS or error <= 2e-16 * steps:
+        # the difference is the error of the coarser value; that of the finer one is smaller by the order 8
+        error = float((np.abs(now - before).max(axis=0) / scale).max()) / ((steps / old) ** 8 - 1.0)
+        if error <= 0.2 * target or steps >= _MAX_STEPS or error <= 2e-16 * steps or not np.isfinite(error):
             return steps, 4.0 * error * float(scale.max())
         before = now
 
