@@ -199,7 +199,7 @@ def nonlinear_absorber(
         },
         [x1, x2],
         parameters=dict(mu1=mu1, mu2=mu2, lam=lam, alpha=alpha, beta=beta, epsilon=epsilon, f=f, omega=omega),
-        bounds=dict(omega=_POSITIVE),
+        bounds=dict(omega=_POSITIVE, epsilon=(0, float("inf"))),
         outputs=dict(relative=x2 - x1),
         name="nonlinear_absorber",
         description="nonlinear tuned vibration absorber on a Duffing oscillator",
