@@ -55,7 +55,7 @@ def _intervals(system: System) -> dict[str, tuple[float, float]]:
     for key, value in system.parameters.items():
         lo, hi = bounds.get(key, (-math.inf, math.inf))
         if not lo <= value <= hi:
-            raise InputError(f"parameter '{key}' = {value:g} is outside its bounds [{lo:g}, {hi:g}]")
+            raise InputError(f"parameter '{key}' = {value:.15g} is outside its bounds [{lo:.15g}, {hi:.15g}]")
     return bounds
 
 

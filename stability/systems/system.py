@@ -238,7 +238,7 @@ class System(Constructors):
         if not math.isfinite(number):
             raise InputError(f"parameter '{key}' must be finite; got {number}")
         if not lo <= number <= hi:
-            raise InputError(f"parameter '{key}' = {number:g} is outside its bounds [{lo:g}, {hi:g}]")
+            raise InputError(f"parameter '{key}' = {number:.15g} is outside its bounds [{lo:.15g}, {hi:.15g}]")
 
     # ------------------------------------------------------------------ data
     def to_dict(self) -> dict[str, Any]:
