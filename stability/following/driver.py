@@ -273,7 +273,7 @@ def _first_step(seed: Seed, birth: Point, settings: Settings, side: float) -> Fo
         found = problem.correct(birth.u + h * t.u, params, settings.name, normal, 0.0, settings.tolerance)
         point = _first_accepted(birth, t, found, settings, h)
         if point is not None:
-            follower = Follower(settings, point, length=2 * point.step)
+            follower = Follower(settings, point, length=2 * point.step, mirrored=seed.sides == 1)
             follower.entries.append(Entry(point, None))
             follower._adapt()
             return follower

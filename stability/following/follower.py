@@ -21,7 +21,7 @@ from ..protocols import Corrected, Tangent
 from ..words import Kind, Status
 from .events import changes, crossed, dip_of, double_turn
 from .locating import Found, Locator
-from .loops import Home
+from .loops import Home, collapsed
 from .points import Point, dot, make_point
 from .settings import Progress, Settings
 from .stepping import KINK, Comparison, compare, next_length, predict
@@ -48,7 +48,7 @@ class Follower(Iterator[Point]):
 
     def __init__(
         self, settings: Settings, first: Point, *, before: Point | None = None, length: float | None = None,
-        since_adapt: int = 0, home: Home | None = None, limit: int | None = None, special_so_far: int = 0,
+        since_adapt: int = 0, home: Home | None = None, limit: int | None = None, mirrored: bool = False,
     ) -> None:
         self.settings, self.last, self.before = settings, first, before
         self.length = settings.steps.first if length is None else length
@@ -57,7 +57,7 @@ class Follower(Iterator[Point]):
         self.entries: list[Entry] = []
         self.status: Status | None = None
         self.accepted = 0
-        self.special = special_so_far
+        self.mirrored = mirrored  # beyond its other end the branch repeats itself, shifted in time
         self.home = Home(first) if home is None else home
         self.locator = Locator(settings.name, settings.index, settings.tolerance, settings.steps.shortest)
         self._growth = 1.0
@@ -186,7 +186,6 @@ class Follower(Iterator[Point]):
             return
         at_point = self._value_at(point)
         self.entries.append(Entry(point, at_point))
-        self.special += at_point is not None
         self.accepted += 1
         self.length = next_length(seen.distance, seen, last, point, settings.steps)
         if at_point is not None and self._named_stop(at_point):
@@ -212,10 +211,12 @@ class Follower(Iterator[Point]):
         for one in found:
             previous = self.entries[-1].point if self.entries else self.last
             point = one.point._replace(step=max(one.point.s - previous.s, 0.0))
+            returned = self.mirrored and one.kind in (Kind.BRANCH_POINT, Kind.FOLD) and collapsed(point)
+            if returned:  # the two families cross there
+                one = one._replace(kind=Kind.BRANCH_POINT)
             self.entries.append(Entry(point, one._replace(point=point)))
-            self.special += 1
-            if self._named_stop(one):
-                self.status = Status.STOPPED
+            if returned or self._named_stop(one):
+                self.status = Status.CLOSED_LOOP if returned else Status.STOPPED
                 self.before, self.last = None, point
                 return True
         self.entries.sort(key=lambda e: e.point.s)

@@ -238,9 +238,13 @@ def _without_twin(change: Changes, located: list[Found], length: float) -> list[
     """A pitchfork met on its own side branch turns the parameter too: of fold and branch point there, the latter."""
     if not (change.fold and change.branch):
         return located
-    places = {f.kind: f.point.s for f in located}
-    gap = abs(places.get(Kind.FOLD, math.inf) - places.get(Kind.BRANCH_POINT, -math.inf))
-    return [f for f in located if f.kind is not Kind.FOLD] if gap < 1e-4 * length + 1e-7 else located
+    places = {f.kind: f.point for f in located}
+    if Kind.FOLD not in places or Kind.BRANCH_POINT not in places:
+        return located
+    p, q = places[Kind.FOLD], places[Kind.BRANCH_POINT]
+    # the fold's own system is singular there, so its place along the curve is less accurate than its parameter
+    one = abs(p.parameter - q.parameter) * p.tangent.weight < 1e-8 and abs(p.s - q.s) < 0.1 * length + 1e-7
+    return [f for f in located if f.kind is not Kind.FOLD] if one else located
 
 
 def _secant(ga: float, gb: float) -> float:

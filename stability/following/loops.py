@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from ..errors import ConvergenceError, InputError
+from ..results.solutions import PeriodicOrbit
 from .locating import Locator, chord_length
 from .points import Point, dot, make_point
 
-__all__ = ["Home"]
+__all__ = ["Home", "collapsed"]
 
 _SAME = 1e-6
 _FEWEST = 4
@@ -73,3 +76,19 @@ class Home:
         du = p.u - q.u
         size = 1 + math.sqrt(dot(w, p.u, p.u))
         return math.sqrt(dot(w, du, du)) + abs(p.parameter - q.parameter) * p.tangent.weight < _SAME * size
+
+
+def collapsed(point: Point) -> bool:
+    """Whether an orbit repeats itself after half its period, or stands still: a family has come back to its parents.
+
+    Doubled orbits end where they become the simple orbit twice over, orbits born at a Hopf point where they shrink to
+    an equilibrium; beyond, the same solutions follow shifted in time. Differences count relative to the states' scales.
+    """
+    solution = point.problem.view(point.u, point.params)
+    if not isinstance(solution, PeriodicOrbit):
+        return False
+    times = np.linspace(0.0, 0.5 * solution.period, 33)
+    wound = 0.5 * np.asarray(solution.winding)[:, None]
+    first, second = solution(times), solution(times + 0.5 * solution.period) - wound
+    size = np.maximum(np.abs(first).max(axis=1), getattr(point.problem, "scales", 0.0)) + 1e-300
+    return bool((np.abs(first - second).max(axis=1) <= 1e-3 * size).all())
