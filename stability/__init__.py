@@ -23,6 +23,7 @@ _EXPORTS: dict[str, str] = {
     "Branch": "results.branch",
     "Collocation": "problems.collocation",
     "Shooting": "problems.shooting",
+    "HarmonicBalance": "problems.harmonic_balance",
     "chart": "charting.charts",
     "StabilityChart": "results.chart",
     "ConstantAcceleration": "systems.excitation",
