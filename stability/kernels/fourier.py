@@ -23,7 +23,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FourierBasis", "decay", "derivative", "fourier_basis", "ranks", "resized", "series", "stretched"]
+__all__ = ["FourierBasis", "derivative", "fourier_basis", "ranks", "resized", "series", "stretched", "tail_fit"]
 
 Array = NDArray[np.float64]
 
@@ -81,22 +81,27 @@ def stretched(c: Array, factor: int, harmonics: int) -> Array:
     return out
 
 
-def decay(sizes: Array) -> tuple[float, float]:
-    """(ratio, power) of a decaying tail: sizes ~ ratio^k and ~ k^-power, by least squares on the envelope of `sizes`.
+def tail_fit(sizes: Array) -> tuple[float, float, bool]:
+    """(ratio, power, whether the ratio fits better): sizes ~ ratio^k or ~ k^-power, by least squares on their envelope.
 
-    sizes (K,) belong to harmonics 1 .. K; the envelope (largest of this and all later ones) ignores missing harmonics
-    of symmetric motions. Values below rounding (1e-16 of the largest) do not count. (0, inf) where nothing is left.
+    sizes (K,) belong to harmonics 1 .. K; the envelope (largest of this and all later ones) bridges the harmonics that
+    symmetric motions do not have. Values below rounding (1e-16 of the largest) do not count; with fewer than two left
+    the ratio is 0.
+
+    >>> ratio, _, geometric = tail_fit(0.5 ** np.arange(12))
+    >>> round(ratio, 6), geometric
+    (0.5, True)
     """
     envelope = np.maximum.accumulate(np.asarray(sizes, float)[::-1])[::-1]
     top = float(envelope[0]) if len(envelope) else 0.0
     used = np.flatnonzero(envelope > 1e-16 * top)
     if top == 0.0 or len(used) < 2:
-        return 0.0, np.inf
+        return 0.0, np.inf, True
     used = used[len(used) // 3 :] if len(used) > 4 else used
     k, y = used + 1.0, np.log(envelope[used])
-    slope = float(np.polyfit(k, y, 1)[0])
-    power = -float(np.polyfit(np.log(k), y, 1)[0])
-    return float(np.exp(min(slope, 0.0))), max(power, 0.0)
+    fits = [np.polyfit(x, y, 1) for x in (k, np.log(k))]
+    misfits = [float(((np.polyval(f, x) - y) ** 2).sum()) for f, x in zip(fits, (k, np.log(k)))]
+    return float(np.exp(min(fits[0][0], 0.0))), max(-float(fits[1][0]), 0.0), misfits[0] <= misfits[1]
 
 
 @dataclass(frozen=True, eq=False)

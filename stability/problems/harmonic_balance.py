@@ -32,7 +32,7 @@ from ..kernels.gauss import gauss_rule
 from ..protocols import Corrected, Spectrum, Tangent
 from .harmonic_layout import HarmonicLayout
 from .harmonic_linearisation import HarmonicLinearisation
-from .harmonic_samples import first_samples
+from .harmonic_samples import first_samples, polynomial_degree
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
 
 __all__ = ["HarmonicBalance"]
@@ -149,6 +149,12 @@ class HarmonicBalance(OrbitDiscretisation):
     def places(self) -> Array:
         """The samples s."""
         return self.layout.basis.points
+
+    @cached_property
+    def exact_samples(self) -> bool:
+        """Whether the samples are exact for the equations' degree, so that there is no aliasing to measure."""
+        degree = polynomial_degree(self.system)
+        return degree is not None and self.samples >= first_samples(self.system, self.harmonics, self.subharmonic, degree)
 
     @cached_property
     def phase(self) -> Array:
@@ -289,7 +295,7 @@ class HarmonicBalance(OrbitDiscretisation):
                 damping = min(damping, -0.5 * u[-1] / step[-1])
             u, params[index] = u + damping * step, params[index] + damping * change_l
             if change <= tolerance * (1 + length):
-                return self._corrected(u, params, x, tangent, residual, iteration, L, A)
+                return self._corrected(u, params, x, tangent, residual, iteration, L, A, free)
             if tangent is not None and iteration > 1 and change > 2 * previous:
                 break
             previous = change
@@ -303,7 +309,7 @@ class HarmonicBalance(OrbitDiscretisation):
 
     def _corrected(
         self, u: Array, params: Array, x: Array, tangent: Tangent | None, residual: float, iterations: int,
-        L: HarmonicLinearisation, A: Array,
+        L: HarmonicLinearisation, A: Array, free: str,
     ) -> Corrected:  # fmt: skip
         w = self.weights
         if tangent is None:
@@ -313,7 +319,7 @@ class HarmonicBalance(OrbitDiscretisation):
             length = float(np.sqrt(w @ t**2 + (tangent.weight * k) ** 2))
             new = Tangent(t / length, k / length, tangent.weight)
             A[-1, :-1], A[-1, -1] = w * new.u, tangent.weight**2 * new.parameter
-            self._memo["tangent"] = (u, L.u, new)
+            self._memo["tangent"] = (u, L.u, new, free)
         sign = int(np.linalg.slogdet(A * self._row_scales(0 if tangent is None else 1))[0])
         return Corrected(u, params, new, residual, iterations, sign, L, True)
 

@@ -40,14 +40,16 @@ def polynomial_degree(system: Any) -> int | None:
     return _degree_of(system.rhs, tuple(system.states))
 
 
-def first_samples(system: Any, harmonics: int, subharmonic: int) -> int:
-    """An even number of samples, exact for polynomials up to degree 12; see the head of this file.
+def first_samples(system: Any, harmonics: int, subharmonic: int, degree: int | None = None) -> int:
+    """An even number of samples, exact for polynomials up to degree 12 (or `degree`); see the head of this file.
 
     >>> import stability as st
     >>> first_samples(st.models.duffing(), 7, 1)
     38
     """
-    degree = polynomial_degree(system)
-    degree = _UNKNOWN if degree is None else min(max(degree, 2), _HIGHEST)
+    if degree is None:
+        known = polynomial_degree(system)
+        degree = _UNKNOWN if known is None else min(known, _HIGHEST)
+    degree = max(degree, 2)
     count = (degree + 2) * harmonics + _FORCING * subharmonic + 1
     return int(2 * np.ceil(max(count, 4 * harmonics + 2) / 2))

@@ -1,24 +1,50 @@
-r"""Stability of a harmonic-balance orbit: Hill's exponents, checked by the monodromy along the corrected orbit."""
+r"""Stability of a harmonic-balance orbit: Hill's exponents, checked by the monodromy along the corrected orbit.
+
+Two computations that share nothing but the orbit:
+
+* *Hill*: exponents of the truncated system's own Hill matrix. A fold of the truncated system is an eigenvalue zero of
+  it, so that counts and folds agree at every H.
+* *Monodromy*: the variational equation along the orbit corrected by its missing harmonics (harmonic_truncation),
+  integrated by Gauss collocation (kernels/condensation).
+
+The modes of the second, exp(-lambda t) Phi(t) y, cut off after H harmonics, are excellent trial vectors for the first:
+with the left ones (rows of their inverse) the two-sided Rayleigh quotient
+
+    lambda = w^T Hill v / w^T v
+
+differs from Hill's eigenvalue by the product of both residuals. Where that bound is not below 1e-10, Hill's matrix is
+solved whole and its exponents are selected (kernels/hill_matrix). The difference between the two sets of multipliers is
+the error estimate: truncation of orbit and of modes both. A verdict that it does not support is UNDETERMINED.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..kernels.hill_matrix import hill_matrix, mean_harmonics, selected
+from ..kernels.fourier import fourier_basis, series
+from ..kernels.gauss import gauss_rule
+from ..kernels.hill_matrix import hill_matrix, koopman_hill, mean_harmonics, selected
 from ..protocols import Spectrum
-from .orbit_spectrum import eigenvalues, orbit_spectrum
+from .harmonic_layout import slope_of
+from .harmonic_truncation import Correction, correction
+from .orbit_spectrum import deflated, eigenvalues, orbit_spectrum, spectrum_distance
 
 if TYPE_CHECKING:
+    from .harmonic_balance import HarmonicBalance
     from .harmonic_linearisation import HarmonicLinearisation
 
-__all__ = ["HillModes", "checked_spectrum", "hill_modes"]
+__all__ = ["HillModes", "Propagation", "checked_spectrum", "hill_modes", "independent_multipliers", "propagated"]
 
 Array = np.ndarray
+_DEGREE = 5
+_BOUND = 1e-10
+_APART = 1e-2  # autonomous: nearer multipliers to 1 than this are left to the whole problem
 
 
+# ---------------------------------------------------------------------- Hill's matrix, whole
 @dataclass(frozen=True, eq=False)
 class HillModes:
     """The eigenproblem of Hill's matrix, solved whole.
@@ -56,18 +82,205 @@ def all_products(L: HarmonicLinearisation) -> Array:
 
 def hill_modes(L: HarmonicLinearisation) -> HillModes:
     """All modes of the truncated Hill matrix and the real monodromy matrix that the selected ones make."""
-    n = L.problem.layout.n
-    values, vectors = np.linalg.eig(hill_matrix(all_products(L), L.omega))
+    n, D = L.problem.layout.n, L.problem.scales
+    matrix = hill_matrix(all_products(L), L.omega)
+    if not np.isfinite(matrix).all():
+        nothing = np.full((n, n), np.nan)
+        empty = np.zeros((0, 0), complex)
+        return HillModes(empty[0:0].ravel(), empty, empty, np.zeros(0, int), np.full(n, np.nan), empty, nothing, False)
+    values, vectors = np.linalg.eig(matrix)
+    values, vectors = values.astype(complex), vectors.astype(complex)
     spread = mean_harmonics(vectors, n)[1]
     chosen, certain = selected(values, spread, L.omega, n)
-    mu = np.exp(values[chosen] * L.period)
+    with np.errstate(over="ignore"):
+        mu = np.exp(values[chosen] * L.period)
     blocks = vectors.reshape(-1, n, len(values))
     start = blocks[0] + blocks[1::2].sum(axis=0)
-    Y, D = start[:, chosen], L.problem.scales
-    monodromy = np.real((Y * mu) @ np.linalg.inv(Y)) * D / D[:, None]
-    return HillModes(values, vectors, np.linalg.inv(vectors), chosen, mu, start, monodromy, certain)
+    try:
+        inverse = np.linalg.inv(vectors)
+        monodromy = np.real((start[:, chosen] * mu) @ np.linalg.inv(start[:, chosen])) * D / D[:, None]
+    except np.linalg.LinAlgError:  # a mode that is not there twice: the monodromy matrix is not to be had this way
+        inverse, monodromy = np.full_like(vectors, np.nan), np.full((n, n), np.nan)
+    return HillModes(values, vectors, inverse, chosen, mu, start, monodromy, certain)
+
+
+# ---------------------------------------------------------------------- monodromy along the corrected orbit
+class Propagation(NamedTuple):
+    """Phi at the starts of S equal intervals (S, n, n), Phi(T) (n, n), f at s = 0 (n,), and the defect of Liouville."""
+
+    fundamental: Array
+    monodromy: Array
+    flow: Array
+    defect: float
+
+
+class _Nodes(NamedTuple):
+    s: Array
+    phase: Array
+    G: Array
+    slope: Array
+    widths: Array
+    LU: Array
+    pivots: Array
+    Z: Array
+    M: Array
+    none: Array
+
+
+def _nodes(problem: HarmonicBalance) -> _Nodes:
+    known = problem._memo.get("nodes")
+    if known is None:
+        layout = problem.layout
+        n, small, S = layout.n, layout.q, max(16, 2 * layout.harmonics + 2)
+        s = ((np.arange(S)[:, None] + gauss_rule(_DEGREE).points) / S).ravel()
+        G = series(2 * layout.harmonics, s)
+        size = _DEGREE * small
+        known = problem._memo["nodes"] = _Nodes(
+            s, np.mod(problem.multiple * s, 1.0), G, slope_of(G), np.full(S, 1.0 / S), np.empty((S, size, size)),
+            np.empty((S, size), np.int64), np.empty((S, _DEGREE * n, n)), np.empty((S, n, n)),
+            np.empty((S, _DEGREE * n, 0)),
+        )  # fmt: skip
+    return known  # type: ignore[no-any-return]
+
+
+def propagated(L: HarmonicLinearisation, found: Correction) -> Propagation | None:
+    """The variational equation along the corrected orbit over one period; None where it is not finite."""
+    from ..kernels.condensation import condense
+
+    problem, layout, flow = L.problem, L.problem.layout, L.problem.flow
+    nodes, rule, n = _nodes(L.problem), gauss_rule(_DEGREE), L.problem.layout.n
+    X = layout.states_by(nodes.G, nodes.slope, nodes.s, found.coefficients, 2 * np.pi / found.period)
+    if not np.isfinite(X).all():
+        return None
+    F, J = problem.evaluations.FJ(nodes.phase, X, L.params)
+    if not np.isfinite(J).all():
+        return None
+    sign = condense(
+        rule.inverse, rule.matrix, rule.row_sums, rule.update, nodes.widths, found.period, J, flow.kept, flow.position,
+        nodes.none, nodes.LU, nodes.pivots, nodes.Z, nodes.M,
+    )  # fmt: skip
+    if sign == 0.0:
+        return None
+    S = len(nodes.widths)
+    fundamental = np.empty((S + 1, n, n))
+    fundamental[0] = np.eye(n)
+    for j in range(S):
+        np.dot(nodes.M[j], fundamental[j], out=fundamental[j + 1])
+    trace = np.einsum("kii->k", J).reshape(S, -1) @ rule.weights
+    growth = np.exp(found.period / S * float(trace.sum()))
+    defect = abs(float(np.linalg.det(fundamental[-1])) - growth) / max(1.0, growth)
+    return Propagation(fundamental[:-1], fundamental[-1], F[0], defect)
+
+
+def _refined(L: HarmonicLinearisation, along: Propagation) -> tuple[Array, Array] | None:
+    """(multipliers along the orbit, Hill multipliers by the Rayleigh quotient), or None where the bound is too large."""
+    layout, T, omega = L.problem.layout, L.period, L.omega
+    mu, Y = np.linalg.eig(along.monodromy)
+    if not (np.abs(mu) > 1e-200).all():
+        return None
+    exponents = np.log(mu.astype(complex))
+    S = len(along.fundamental)
+    basis, samples = fourier_basis_of(layout.harmonics, S), layout.basis
+    shrink = np.exp(-exponents * (np.arange(S) / S)[:, None])
+    P = (along.fundamental @ Y) * shrink[:, None, :]
+    try:
+        left = np.linalg.inv(P)  # (S, mode, state)
+    except np.linalg.LinAlgError:
+        return None
+    n = layout.n
+    v = (basis @ P.reshape(S, n * n)).reshape(-1, n, n)  # coefficient, state, mode
+    w = (basis @ left.reshape(S, n * n)).reshape(-1, n, n)  # coefficient, mode, state
+    values = (samples.synthesis @ v.reshape(-1, n * n)).reshape(-1, n, n)
+    applied = (samples.analysis @ (L.J @ values).reshape(-1, n * n)).reshape(-1, n, n)
+    applied[1::2] -= (omega * samples.k[1::2, None, None]) * v[2::2]
+    applied[2::2] += (omega * samples.k[2::2, None, None]) * v[1::2]
+    mean = np.where(samples.k == 0, 1.0, 0.5)[:, None, None]
+    wt = w.transpose(0, 2, 1) * mean
+    below = (wt * v).sum(axis=(0, 1))
+    quotient = (wt * applied).sum(axis=(0, 1)) / below
+    rest = np.sqrt((mean * np.abs(applied - quotient * v) ** 2).sum(axis=(0, 1)))
+    size = np.sqrt((np.abs(wt) ** 2 / mean).sum(axis=(0, 1)))
+    bound = (rest * size / np.abs(below)) * (rest / np.sqrt((mean * np.abs(v) ** 2).sum(axis=(0, 1)))) / omega
+    if not (bound * T < _BOUND * np.maximum(1.0, 1.0 / np.abs(mu))).all():
+        return None
+    change = quotient * T - exponents
+    change = np.where(np.imag(mu) == 0.0, change.real, change)
+    return mu, mu * np.exp(change)
+
+
+def fourier_basis_of(harmonics: int, samples: int) -> Array:
+    """Analysis matrix (2H + 1, S) of S >= 2 H + 1 samples."""
+    if samples >= 4 * harmonics + 1:
+        return fourier_basis(harmonics, samples).analysis
+    known = _ANALYSIS.get((harmonics, samples))
+    if known is None:
+        known = series(harmonics, np.arange(samples) / samples).T * (2.0 / samples)
+        known[0] *= 0.5
+        _ANALYSIS[harmonics, samples] = known
+    return known
+
+
+_ANALYSIS: dict[tuple[int, int], Array] = {}
 
 
 def checked_spectrum(L: HarmonicLinearisation) -> Spectrum:
-    values = eigenvalues(L.spectral)
-    return orbit_spectrum(values, 1e-9)
+    """Hill multipliers without the trivial one, their error, counts and verdict."""
+    problem = L.problem
+    n, own = problem.layout.n, problem.own
+    unknown = np.full(n - own, np.nan, complex)
+    if not np.isfinite(L.J).all():
+        return orbit_spectrum(unknown, np.inf)
+    found = correction(L)
+    along = propagated(L, found) if np.isfinite(found.error) else None
+    if along is not None and not own:
+        refined = _refined(L, along)
+        if refined is not None:
+            others, values = refined
+            error = spectrum_distance(values, others) + _floor(along)
+            return orbit_spectrum(_ordered(values), error)
+    values, certain = _whole_values(L)
+    if along is None or not np.isfinite(values).all():
+        return orbit_spectrum(values, np.inf)
+    M, error = along.monodromy * problem.scales / problem.scales[:, None], _floor(along)
+    if own:
+        M, drift = deflated(M, along.flow / problem.scales)
+        error += drift
+    others = eigenvalues(M)
+    error += spectrum_distance(values, others) + spectrum_distance(others, values)
+    return orbit_spectrum(values, error)
+
+
+def _floor(along: Propagation) -> float:
+    return along.defect + 1e-15 * len(along.fundamental) * float(np.abs(along.monodromy).max())
+
+
+def _ordered(values: Array) -> Array:
+    """By descending modulus, conjugates side by side, the upper one first."""
+    return np.asarray(values[np.lexsort((-values.imag, -np.abs(values).round(14)))])
+
+
+def _whole_values(L: HarmonicLinearisation) -> tuple[Array, bool]:
+    """Multipliers from Hill's matrix solved whole, the trivial one removed by the direction of the flow."""
+    modes, problem = L.modes, L.problem
+    if not np.isfinite(modes.monodromy).all():
+        return np.full(problem.layout.n - problem.own, np.nan, complex), False
+    if not problem.own:
+        return eigenvalues(modes.monodromy), modes.certain
+    velocity = problem.evaluations.F(None, np.ascontiguousarray(L.X[:1]), L.params)[0]
+    return eigenvalues(deflated(modes.monodromy, velocity / problem.scales)[0]), modes.certain
+
+
+# ---------------------------------------------------------------------- for users and tests
+def independent_multipliers(problem: HarmonicBalance, u: Array, params: Array) -> dict[str, Array]:
+    """Multipliers (n,) by three methods: "hill", "koopman" (subharmonic form), "monodromy"; all of them, trivial too."""
+    L = problem.linearise(u, params)
+    n, H = problem.layout.n, problem.harmonics
+    out: dict[str, Array] = {"hill": eigenvalues(L.modes.monodromy)}
+    samples = 8 * H + 4
+    s = np.arange(samples) / samples
+    X = problem.layout.states(L.c, L.omega, s)
+    A = problem.evaluations.FJ(np.mod(problem.multiple * s, 1.0), X, L.params)[1]
+    out["koopman"] = eigenvalues(koopman_hill(A, L.omega, H))
+    along = propagated(L, correction(L))
+    out["monodromy"] = np.full(n, np.nan, complex) if along is None else eigenvalues(along.monodromy)
+    return out
