@@ -211,7 +211,7 @@ def _restarted(branch: Branch, settings: Settings, end: int) -> Follower | None:
     other = _point_from(branch, 0 if end else len(branch) - 1, settings, 0.0, sign)
     return Follower(
         settings, last, before=before, length=float(resume["length"]), since_adapt=int(resume["since_adapt"]),
-        home=Home(other),
+        home=Home(other), rate=float(np.nanmax(np.abs(branch.values), initial=0.0)),
     )
 
 

@@ -58,7 +58,9 @@ def continuation(
         The branch starts at `from` (unless the problem has a seed) and is followed until it leaves the interval at
         either end (a last point exactly on it), closes, or stops.
     start : state, solution or None
-        A first solution, or something near one: dict of state names, array, FixedPoint, PeriodicOrbit.
+        A first solution, or something near one: dict of state names, array, FixedPoint, PeriodicOrbit. A solution whose
+        own parameter value lies inside the window is followed from there in both directions (so closed branches are
+        found whole).
     ds, ds_max : float
         First and longest step, in the scaled norm where the window has width one and every state its own scale
         (defaults 0.01 and 0.2).
@@ -112,12 +114,26 @@ def continuation(
         if start is not None:
             raise InputError("this problem is born at a special point: it brings its own start, leave start= away")
         return _from_seed(seed, settings)
-    first = _first_point(problem, settings, start)
-    follower = Follower(settings, first)
-    found = follower._value_at(first)
-    follower.entries.append(Entry(first, found))
-    follower.run()
-    return assemble(settings, follower.entries, (Status.PARAMETER_BOUND, _ended(follower)), (None, follower))
+    inside = _inside_window(start, settings)
+    first = _first_point(problem, settings, start, settings.window[0] if inside is None else inside)
+    ahead = Follower(settings, first)
+    mark = ahead._value_at(first)
+    ahead.run()
+    if inside is None:
+        entries = [Entry(first, mark), *ahead.entries]
+        return assemble(settings, entries, (Status.PARAMETER_BOUND, _ended(ahead)), (None, ahead))
+    if ahead.status in (Status.CLOSED_LOOP, Status.STOPPED):
+        entries = [Entry(first, mark), *ahead.entries]
+        return assemble(settings, entries, (_ended(ahead), _ended(ahead)), (None, ahead))
+    behind = Follower(settings, _turned(Entry(first, None)).point).run()
+    entries = [*(_turned(e) for e in reversed(behind.entries)), Entry(first, mark), *ahead.entries]
+    return assemble(settings, entries, (_ended(behind), _ended(ahead)), (behind, ahead))
+
+
+def _inside_window(start: Any, settings: Settings) -> float | None:
+    """The parameter value of a start that is a solution from inside the window; None for any other start."""
+    value = getattr(start, "params", {}).get(settings.name)
+    return value if value is not None and settings.low < value < settings.high else None
 
 
 def followers(problem: Problem, name: str, window: tuple[float, float], **options: Any) -> tuple[Follower, ...]:
@@ -130,7 +146,7 @@ def followers(problem: Problem, name: str, window: tuple[float, float], **option
     settings = checked(problem, name, window, **{**given, "progress": None, **options})
     seed = problem.seed()
     if seed is None:
-        return (Follower(settings, _first_point(problem, settings, start)),)
+        return (Follower(settings, _first_point(problem, settings, start, settings.window[0])),)
     return tuple(f for f in _sides(seed, settings)[1] if f is not None)
 
 
@@ -146,15 +162,15 @@ def _params_of(problem: Problem) -> Array:
     return np.array(list(problem.parameters.values()), dtype=float)
 
 
-def _first_point(problem: Problem, settings: Settings, start: Any) -> Point:
-    """A corrected solution at the first end of the window, its tangent pointing inward."""
+def _first_point(problem: Problem, settings: Settings, start: Any, value: float) -> Point:
+    """A corrected solution at a parameter value, its tangent pointing to the far end of the window."""
     params = _params_of(problem)
-    params[settings.index] = settings.window[0]
+    params[settings.index] = value
     u = problem.start(params, start)
     found = problem.correct(u, params, settings.name, None, 0.0, settings.tolerance)
     if not found.converged:
         raise ConvergenceError(
-            f"no solution at {settings.name} = {settings.window[0]:g}: {found.note}; give start= nearer to a solution, "
+            f"no solution at {settings.name} = {value:g}: {found.note}; give start= nearer to a solution, "
             "or begin at another end of the window",
             last=u, iterations=found.iterations, note=found.note,
         )

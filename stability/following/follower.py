@@ -48,12 +48,11 @@ class Follower(Iterator[Point]):
 
     def __init__(
         self, settings: Settings, first: Point, *, before: Point | None = None, length: float | None = None,
-        since_adapt: int = 0, home: Home | None = None, limit: int | None = None, mirrored: bool = False,
+        since_adapt: int = 0, home: Home | None = None, mirrored: bool = False, rate: float = 0.0,
     ) -> None:
         self.settings, self.last, self.before = settings, first, before
         self.length = settings.steps.first if length is None else length
         self.since_adapt = since_adapt
-        self.limit = settings.max_points if limit is None else limit
         self.entries: list[Entry] = []
         self.status: Status | None = None
         self.accepted = 0
@@ -61,6 +60,7 @@ class Follower(Iterator[Point]):
         self.home = Home(first) if home is None else home
         self.locator = Locator(settings.name, settings.index, settings.tolerance, settings.steps.shortest)
         self._growth = 1.0
+        self._rate = max(rate, float(np.abs(first.spectrum.values).max(initial=0.0)))
         self._norm = self._norm_of(first)
         self._extent: list[tuple[float, float]] = []
         self._event_values = [f(first.problem.view(first.u, first.params)) for _, f in settings.events]
@@ -73,7 +73,7 @@ class Follower(Iterator[Point]):
     def __next__(self) -> Point:
         if self.status is not None:
             raise StopIteration
-        if len(self.entries) >= self.limit:
+        if len(self.entries) >= self.settings.max_points:
             self.status = Status.MAX_POINTS
             raise StopIteration
         step = self._advance()
@@ -166,7 +166,7 @@ class Follower(Iterator[Point]):
     ) -> tuple[Point, Comparison] | float:
         last, settings = self.last, self.settings
         point = make_point(last.problem, found, tangent, settings.index, last.s, h)
-        seen = compare(last, point, guess)
+        seen = compare(last, point, guess, self._rate)
         point = point._replace(s=last.s + seen.distance, step=seen.distance)
         if seen.worst > 1 and not h < KINK * settings.steps.longest:
             return max(0.25, 0.8 / seen.worst)
@@ -187,6 +187,7 @@ class Follower(Iterator[Point]):
         at_point = self._value_at(point)
         self.entries.append(Entry(point, at_point))
         self.accepted += 1
+        self._rate = max(self._rate, float(np.abs(point.spectrum.values).max(initial=0.0)))
         self.length = next_length(seen.distance, seen, last, point, settings.steps)
         if at_point is not None and self._named_stop(at_point):
             self.status = Status.STOPPED

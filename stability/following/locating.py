@@ -146,8 +146,10 @@ class Locator:
         critical = a.problem.critical
         kinds = change.suspects(critical.pair, critical.minus is not None)
         located = [f for f in (self.attempt(kind, a, b) for kind in kinds) if f is not None]
-        located = _without_twin(change, located, chord_length(a, b))
-        located.sort(key=lambda f: f.point.s)
+        single = _without_twin(change, located, chord_length(a, b))
+        if len(single) == 1 < len(located) and not change.collision:
+            return single
+        located = sorted(single, key=lambda f: f.point.s)
         if located and self._separate(a, b, located):
             return located
         if fine and located and change.explained([f.kind for f in located]):

@@ -71,8 +71,10 @@ def predict(last: Point, before: Point | None, h: float) -> tuple[Array, float]:
     return u, parameter
 
 
-def spectral_motion(a: NDArray[np.complex128], b: NDArray[np.complex128], circle: bool) -> float:
+def spectral_motion(a: NDArray[np.complex128], b: NDArray[np.complex128], circle: bool, rate: float = 0.0) -> float:
     """Hausdorff distance of two spectra: multipliers on the Riemann sphere, eigenvalues relative to their size.
+
+    `rate` is the largest modulus met on the branch: eigenvalues far below it may move by a tenth of it.
 
     >>> round(spectral_motion(np.array([1.0 + 0j]), np.array([1.1 + 0j]), True), 3)
     0.048
@@ -83,11 +85,11 @@ def spectral_motion(a: NDArray[np.complex128], b: NDArray[np.complex128], circle
     if circle:
         gap /= np.sqrt(np.multiply.outer(1 + np.abs(a) ** 2, 1 + np.abs(b) ** 2))
     else:
-        gap /= 1e-300 + np.maximum.outer(np.abs(a), np.abs(b)) + 0.1 * float(np.abs(b).max())
+        gap /= 1e-300 + np.maximum.outer(np.abs(a), np.abs(b)) + 0.1 * max(rate, float(np.abs(b).max()))
     return float(max(gap.min(axis=1).max(), gap.min(axis=0).max()))
 
 
-def compare(last: Point, new: Point, guess: tuple[Array, float]) -> Comparison:
+def compare(last: Point, new: Point, guess: tuple[Array, float], rate: float = 0.0) -> Comparison:
     """The checks of the module's head for a candidate on the mesh of `last`; `guess` is where the corrector began."""
     w, t0, t1, weight = last.problem.weights, last.tangent, new.tangent, last.tangent.weight
     du, dl = new.u - last.u, (new.parameter - last.parameter) * weight
@@ -103,7 +105,7 @@ def compare(last: Point, new: Point, guess: tuple[Array, float]) -> Comparison:
     chord = math.acos(max(-1.0, min(1.0, (first + second) / mean)))
     du, dl = new.u - guess[0], (new.parameter - guess[1]) * weight
     missed = math.sqrt(dot(w, du, du) + dl * dl) / length
-    motion = spectral_motion(last.spectrum.values, new.spectrum.values, last.problem.critical.circle)
+    motion = spectral_motion(last.spectrum.values, new.spectrum.values, last.problem.critical.circle, rate)
     return Comparison(length, angle / ANGLE, chord / CHORD, missed / MISSED, motion / MOTION)
 
 

@@ -330,8 +330,10 @@ class Equilibrium:
             if not math.isfinite(length):
                 return Corrected(u, params, None, math.inf, iterations, 0, None, False, "singular")
             new = Tangent(direction[:n] * (s / length), float(direction[n]) / (length * tangent.weight), tangent.weight)
-        # |F| at the last iterate over its scale; the update just made reduces it quadratically
-        residual = float(np.max(np.abs(F) / (np.abs(J) @ (np.abs(u) + s) + 1e-300)))
+        final = self.evaluations.F(_NO_PHASE, u[None, :], params)[0]
+        residual = float(np.max(np.abs(final) / (np.abs(J) @ (np.abs(u) + s) + 1e-300)))
+        if not math.isfinite(residual):
+            return self._failed(u, params, iterations, final, J)
         linearisation = DenseLinearisation(self, u, params, F, J, Fp)
         return Corrected(u, params, new, residual, iterations, int(sign), linearisation, True)
 
