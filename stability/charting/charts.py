@@ -26,6 +26,7 @@ from ..results.chart import StabilityChart
 from ..results.tiles import Layer
 from .boundaries import Tracer
 from .painting import Picture, combine, paint, worst_error
+from .refining import refine
 from .sampling import Sampler
 from .tensors import build_tiles
 from .windows import axis, grid_shape, sampled_window
@@ -113,11 +114,13 @@ def chart(
     grid_x, grid_y = np.linspace(x_lo, x_hi, nx), np.linspace(y_lo, y_hi, ny)
     samplers, layers = [], []
     picture: Picture | None = None
+    error = 0.0
     for rows in blocks(linear, corners):
         part = linear.block(rows)
         sampler = Sampler(part, low, names.index(x_name), names.index(y_name), structure(part, corners), window)
         layer = _layer(sampler, tolerance)
         painted = paint(layer.tiles, layer.form, layer.neutral, grid_x, grid_y, tolerance)
+        error = max(error, refine(sampler, painted, layer.neutral, grid_x, grid_y))
         picture = painted if picture is None else combine(picture, painted)
         samplers.append(sampler)
         layers.append(layer)
@@ -125,7 +128,7 @@ def chart(
     fixed = {k: v for k, v in zip(names, low.tolist(), strict=True) if k not in (x_name, y_name)}
     return StabilityChart(
         x_name, y_name, grid_x, grid_y, picture.growth,
-        Categories(picture.verdict, VERDICTS), Categories(picture.kind, KINDS), picture.error,
+        Categories(picture.verdict, VERDICTS), Categories(picture.kind, KINDS), error,
         fixed, system.name, tuple(layers), Tracer(tuple(samplers)),
     )  # fmt: skip
 

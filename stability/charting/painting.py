@@ -29,18 +29,26 @@ __all__ = ["Picture", "combine", "paint", "worst_error"]
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
 Rows = NDArray[np.intp]
+Doubt = list[tuple[Rows, Rows, Array]]
+Target = tuple[Array, Codes, Codes, Doubt]
 _BLOCK = 32_768
 _PLUS, _MINUS, _PAIR = 1, 2, 3
 
 
 @dataclass(frozen=True, eq=False)
 class Picture:
-    """What `paint` gives: growth (ny, nx), verdict and kind codes (ny, nx) int8, and the largest error."""
+    """What `paint` gives: growth (ny, nx), verdict and kind codes (ny, nx) int8, and the largest error.
+
+    `doubtful` are points whose error exceeds the tolerance, rows and columns (2, B), with their `doubts` (B,); the
+    error is that of all others.
+    """
 
     growth: Array
     verdict: Codes
     kind: Codes
     error: float
+    doubtful: Rows
+    doubts: Array
 
 
 def paint(tiles: tuple[Tile, ...], form: str, neutral: bool, x: Array, y: Array, tolerance: float) -> Picture:
@@ -55,6 +63,7 @@ def paint(tiles: tuple[Tile, ...], form: str, neutral: bool, x: Array, y: Array,
     shape = (len(y), len(x))
     growth, verdict, kind = np.empty(shape), np.empty(shape, np.int8), np.empty(shape, np.int8)
     error = 0.0
+    doubt: Doubt = []
     right, top = max(t.box[1] for t in tiles), max(t.box[3] for t in tiles)
     left, bottom = min(t.box[0] for t in tiles), min(t.box[2] for t in tiles)
     for tile in tiles:
@@ -66,8 +75,11 @@ def paint(tiles: tuple[Tile, ...], form: str, neutral: bool, x: Array, y: Array,
         if columns.start >= columns.stop or rows.start >= rows.stop:
             continue
         into = growth[rows, columns], verdict[rows, columns], kind[rows, columns]
-        error = max(error, _paint_tile(tile, form, neutral, x[columns], y[rows], tolerance, into))
-    return Picture(growth, verdict, kind, error)
+        local: Doubt = []
+        error = max(error, _paint_tile(tile, form, neutral, x[columns], y[rows], tolerance, (*into, local)))
+        doubt += [(i + rows.start, j + columns.start, each) for i, j, each in local]
+    where = [np.concatenate([d[k] for d in doubt] or [np.zeros(0)]) for k in range(3)]
+    return Picture(growth, verdict, kind, error, np.array(where[:2], dtype=np.intp), where[2])
 
 
 def combine(first: Picture, second: Picture) -> Picture:
@@ -78,22 +90,24 @@ def combine(first: Picture, second: Picture) -> Picture:
     kind = np.where(second.growth > first.growth, second.kind, first.kind)
     kind[verdict != UNSTABLE] = 0
     growth = np.maximum(first.growth, second.growth, out=first.growth)
-    return Picture(growth, verdict, kind, max(first.error, second.error))
+    doubtful = np.concatenate([first.doubtful, second.doubtful], axis=1)
+    doubts = np.concatenate([first.doubts, second.doubts])
+    return Picture(growth, verdict, kind, max(first.error, second.error), doubtful, doubts)
 
 
 def worst_error(tile: Tile, form: str, tolerance: float) -> float:
     """Estimated error of the growth rate on a tile, from a 24 x 24 grid, edges left out (see the head)."""
     x0, x1, y0, y1 = tile.box
     x, y = np.linspace(x0, x1, 24), np.linspace(y0, y1, 24)
-    into = np.empty((24, 24)), np.empty((24, 24), np.int8), np.empty((24, 24), np.int8)
+    into: Target = np.empty((24, 24)), np.empty((24, 24), np.int8), np.empty((24, 24), np.int8), []
     return _paint_tile(tile, form, False, x, y, tolerance, into, bulk_only=True)
 
 
 def _paint_tile(
     tile: Tile, form: str, neutral: bool, x: Array, y: Array, tolerance: float,
-    into: tuple[Array, Codes, Codes], bulk_only: bool = False,
+    into: Target, bulk_only: bool = False,
 ) -> float:  # fmt: skip
-    growth, verdict, kind = into
+    growth, verdict, kind, doubt = into
     xi, eta = tile.scaled(x, y)
     across, up = basis(xi, tile.fields.shape[2] - 1), basis(eta, tile.fields.shape[1] - 1).T
     columns = np.ascontiguousarray(tile.fields @ across)  # (Q, Ky, nx)
@@ -109,9 +123,11 @@ def _paint_tile(
         for plane, out in zip(columns, block, strict=True):
             np.dot(up[rows], plane, out=out)
         chi, sigma = (t[rows] if t.shape[0] > 1 else t for t in ticks)
-        target = growth[rows], verdict[rows], kind[rows]
+        local: Doubt = []
+        target = growth[rows], verdict[rows], kind[rows], local
         largest = (weight[rows] @ along.T).max(axis=0)  # of |f|, each function, in this block
         worst = max(worst, painter(block, largest, chi, sigma, tile.error, neutral, tolerance, target, bulk_only))
+        doubt += [(i + first, j, each) for i, j, each in local]
     return worst
 
 
@@ -125,13 +141,13 @@ def _ticks(tile: Tile, xi: Array, eta: Array) -> tuple[Array, Array]:
 def _two_states(
     s: Array, factor: float, positive: Array, negative: Array, uncertain: Callable[[Rows, Rows], Array],
     chi: Array, sigma: Array,
-    neutral: bool, tolerance: float, target: tuple[Array, Codes, Codes], bulk_only: bool, bound: float,
+    neutral: bool, tolerance: float, target: Target, bulk_only: bool, bound: float,
 ) -> float:  # fmt: skip
     """Growth = sigma + factor chi asinh(sqrt(max(s, 0))), its error, verdict and kind.
 
     `bound` is an upper bound of the error of s in the block, `uncertain` a function of indices giving it exactly.
     """
-    growth, verdict, kind = target
+    growth, verdict, kind, doubt = target
     chi_top = float(np.max(chi))
     np.maximum(s, 0.0, out=growth)
     np.sqrt(growth, out=growth)
@@ -166,7 +182,10 @@ def _two_states(
             at = growth[rows, columns]
             codes = np.where(at > each, UNSTABLE, np.where(at < -each, STABLE, UNDETERMINED))
         verdict[rows, columns] = codes
-        error = max(error, float(each.max()))
+        bad = each > tolerance
+        if bad.any():
+            doubt.append((rows[bad], columns[bad], each[bad]))
+        error = max(error, float(np.where(bad, 0.0, each).max()))
     # kind: 3 - 2 [positive] - [negative] where unstable
     np.equal(verdict, UNSTABLE, out=kind.view(bool))
     kind *= 3 - 2 * positive.view(np.int8) - negative.view(np.int8)
@@ -188,7 +207,7 @@ def _encode(verdict: Codes, not_stable: Codes, neutral: bool) -> None:
 
 def _paint_hill(
     f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
-    target: tuple[Array, Codes, Codes], bulk_only: bool,
+    target: Target, bulk_only: bool,
 ) -> float:  # fmt: skip
     largest = float(max(size[0] + size[1], size[2] + size[3]))
     p, m = f[0] * f[1], f[2] * f[3]
@@ -209,7 +228,7 @@ def _paint_hill(
 
 def _paint_two(
     f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
-    target: tuple[Array, Codes, Codes], bulk_only: bool,
+    target: Target, bulk_only: bool,
 ) -> float:  # fmt: skip
     s = 0.25 * f[0] * f[0] + f[1] * f[2]
     inside = s > 0

@@ -19,12 +19,13 @@ __all__ = ["eigenvalue_error", "paint_four", "paint_matrix", "paint_reciprocal"]
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.int8]
+Target = tuple[Array, Codes, Codes, list[tuple[NDArray[np.intp], NDArray[np.intp], Array]]]
 _MOST_REFINED = 4096  # points of one block that are done again
 
 
 def paint_reciprocal(
     f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
-    target: tuple[Array, Codes, Codes], bulk_only: bool,
+    target: Target, bulk_only: bool,
 ) -> float:  # fmt: skip
     """Four states, reciprocal polynomial."""
     theta, kinds, margin = four_states_reciprocal(f[:3])
@@ -38,7 +39,7 @@ def paint_reciprocal(
     each = np.minimum(dw / np.sqrt(np.maximum(distance, 1e-300)), np.sqrt(dw * (1.0 + np.abs(c1))))
     inside = margin < 0
     each = chi * np.where(inside, np.where(-margin > np.maximum(2.0 * dw, d_gap), 0.0, each), each)
-    growth, verdict, kind = target
+    growth, verdict, kind, _ = target
     growth[...] = sigma + chi * theta
     if neutral:
         doubt = np.maximum(2.0 * dw, d_gap)
@@ -51,10 +52,10 @@ def paint_reciprocal(
 
 def paint_four(
     f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
-    target: tuple[Array, Codes, Codes], bulk_only: bool,
+    target: Target, bulk_only: bool,
 ) -> float:  # fmt: skip
     """Four states, any polynomial of determinant 1."""
-    growth, verdict, kind = target
+    growth, verdict, kind, _ = target
     theta, kinds, slope = four_states(f[:3])
     radius = np.exp(theta)
     each = slope * (radius * (1.0 + radius * (1.0 + radius)))
@@ -85,10 +86,10 @@ def paint_four(
 
 def paint_matrix(
     f: Array, size: Array, chi: Array, sigma: Array, d: float, neutral: bool, tolerance: float,
-    target: tuple[Array, Codes, Codes], bulk_only: bool,
+    target: Target, bulk_only: bool,
 ) -> float:  # fmt: skip
     """Any number of states: eigenvalues of M0 at every point; their condition at every 64th (at all, bulk only)."""
-    growth, verdict, kind = target
+    growth, verdict, kind, _ = target
     n = round(float(np.sqrt(len(f))))
     shape = f.shape[1:]
     M = f.reshape(n * n, -1).T.reshape(-1, n, n)

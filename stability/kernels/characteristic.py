@@ -3,7 +3,8 @@
 det(z - M) = z^n - c_1 z^(n-1) + c_2 z^(n-2) - ... + (-1)^n c_n,   c_k the sum of the principal minors of size k,
 by Faddeev and LeVerrier: N_1 = M, c_k = tr(N_k) / k, N_{k+1} = M (c_k I - N_k).
 
-Reference: F. R. Gantmacher, The theory of matrices (1959), volume 1, chapter IV. The coefficients determine the roots well up to n of about 10, not beyond.
+Reference: F. R. Gantmacher, The theory of matrices (1959), volume 1, chapter IV. The coefficients determine
+the roots well up to n of about 10, not beyond.
 """
 
 from __future__ import annotations
