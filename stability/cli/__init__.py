@@ -24,11 +24,14 @@ __all__ = ["main"]
 # command -> one line of help; the module stability.cli.<command> holds it under the name `command`
 COMMANDS: dict[str, str] = {
     "chart": "Stability chart (instability tongues) over two parameters.",
+    "continue": "Follow a branch of solutions, with its special points.",
     "demo": "A guided tour: writes figures and prints a table.",
     "doctor": "Which 'stability' is imported, versions, back ends, caches.",
     "models": "List the catalogue, or describe one model.",
     "new": "Write a commented template of a model as text.",
+    "plot": "Draw a stored chart, branch or orbit.",
 }
+_FILES = {"continue": "continuation"}  # a keyword of Python is no name of a module
 
 
 class _LazyGroup(click.Group):
@@ -39,7 +42,7 @@ class _LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command:
         check_names("command", [name], sorted(COMMANDS), "stability")
-        loaded: click.Command = import_module(f"{__name__}.{name}").command
+        loaded: click.Command = import_module(f"{__name__}.{_FILES.get(name, name)}").command
         return loaded
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

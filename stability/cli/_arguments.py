@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-__all__ = ["SETTING", "SHAPE", "SPAN", "check_outputs", "replacing", "settings"]
+__all__ = ["INTERVAL", "SETTING", "SHAPE", "SPAN", "check_outputs", "replacing", "settings"]
 
 
 class _Span(click.ParamType):
@@ -77,7 +77,23 @@ class _Setting(click.ParamType):
         return name, text
 
 
-SPAN, SHAPE, SETTING = _Span(), _Shape(), _Setting()
+class _Interval(click.ParamType):
+    """``from:to`` -> (from, to), in this order: a branch may be followed downward."""
+
+    name = "from:to"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, float]:
+        if isinstance(value, tuple):
+            return value
+        numbers = [_number(part) for part in value.split(":")]
+        if len(numbers) != 2 or numbers[0] is None or numbers[1] is None:
+            self.fail(f"'{value}' is not from:to in finite numbers, for example 0.3:3", param, ctx)
+        if numbers[0] == numbers[1]:
+            self.fail(f"'{value}': from and to must differ", param, ctx)
+        return numbers[0], numbers[1]
+
+
+SPAN, SHAPE, SETTING, INTERVAL = _Span(), _Shape(), _Setting(), _Interval()
 
 
 def settings(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:

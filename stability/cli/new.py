@@ -25,7 +25,10 @@ def command(console: Console, file: Path, force: bool) -> None:
     with replacing(file) as temporary:
         temporary.write_text(text, encoding="utf-8")
     console.say(f"wrote {file}: a Duffing oscillator, each key explained; edit it, and")
-    console.table([(f"stability models {file}", "shows the equations of motion that come out of it")])
+    console.table([
+        (f"stability models {file}", "shows the equations that come out of it"),
+        (f"stability continue {file} --parameter Omega --range 0.3:2 -o response.png", "follows its response"),
+    ])
     console.result({"written": str(file)})
 
 

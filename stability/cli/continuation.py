@@ -1,0 +1,138 @@
+"""``stability continue MODEL``: follow a branch of solutions along a parameter, with its special points.
+
+A forced system is followed by its periodic orbits (Gauss collocation), an autonomous one by its equilibria. Where a
+branch ends for lack of convergence the exit code is 1; what was computed is written all the same.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..words import Status
+from ._arguments import INTERVAL, SETTING, check_outputs, replacing, settings
+from ._console import FAILURE, OK, Console, as_json_option
+
+if TYPE_CHECKING:
+    from ..results.branch import Branch
+
+PICTURES = (".png", ".svg", ".pdf")
+FORMATS = (*PICTURES, ".npz", ".csv")
+METHODS = ("auto", "collocation", "shooting", "equilibrium")
+
+
+@click.command("continue")
+@click.argument("model")
+@click.option("--parameter", required=True, metavar="NAME", help="The parameter that is continued.")
+@click.option("--range", "window", type=INTERVAL, required=True, help="From where to where; may run downward.")
+@click.option("--set", "pairs", type=SETTING, multiple=True, help="A parameter or an option of the model; repeatable.")
+@click.option("--start", type=SETTING, multiple=True, help="State of a first solution, as x=6; repeatable.")
+@click.option("--method", type=click.Choice(METHODS), default="auto", show_default=True, help="What is solved.")
+@click.option("--switch", "labels", multiple=True, metavar="LABEL",
+              help="Go on from this point (PD1, BP1, HB1) to the branch that is born there; repeatable.")
+@click.option("--max-points", type=click.IntRange(2), default=2000, show_default=True, help="At most so many points.")
+@click.option("--y", metavar="COLUMN", help="What a picture shows, such as u.max.")
+@click.option("-o", "--output", "outputs", type=click.Path(path_type=Path), multiple=True,
+              help="File to write: .png .svg .pdf with all branches, .npz .csv with the last; repeatable.")
+@click.option("--force", is_flag=True, help="Overwrite existing files.")
+@as_json_option
+@click.pass_obj
+def command(
+    console: Console, model: str, parameter: str, window: tuple[float, float], pairs: tuple[tuple[str, Any], ...],
+    start: tuple[tuple[str, Any], ...], method: str, labels: tuple[str, ...], max_points: int, y: str | None,
+    outputs: tuple[Path, ...], force: bool,
+) -> int:  # fmt: skip
+    """Follow a branch of MODEL along a parameter, with its stability and special points.
+
+    \b
+    stability continue duffing --set beta=0.001 --parameter Omega --range 0.3:3 -o branch.png -o branch.npz
+    stability continue autoparametric_pendulum --parameter Omega --range 0.5:1.5 --switch PD1 -o swing.npz
+    """
+    chosen, first = settings(pairs), settings(start)
+    check_outputs(outputs, FORMATS, force)
+    begun = time.perf_counter()
+    with console.working(f"following {model}") as tell:
+        branches = _follow(model, chosen, method, parameter, window, first, labels, max_points, tell)
+    seconds = time.perf_counter() - begun
+    for path in outputs:
+        with console.working(f"writing {path}"), replacing(path) as temporary:
+            _write(branches, temporary, y)
+    document = {
+        "model": model, "set": chosen, "parameter": parameter, "range": list(window), "seconds": seconds,
+        "branches": [_facts(branch) for branch in branches], "written": [str(path) for path in outputs],
+    }  # fmt: skip
+    _report(console, branches, seconds, outputs)
+    console.result(document)
+    broken = (Status.DIVERGED, Status.STEP_TOO_SMALL)
+    return FAILURE if any(status in broken for branch in branches for status in branch.statuses) else OK
+
+
+def _follow(
+    model: str, chosen: dict[str, Any], method: str, parameter: str, window: tuple[float, float],
+    first: dict[str, Any], labels: Sequence[str], max_points: int, tell: Any,
+) -> list[Branch]:  # fmt: skip
+    """The branch, and those that are born at the labelled points, one from the other."""
+    from .. import Collocation, Equilibrium, Shooting, continuation, switch
+    from ._models import system_from
+
+    def progress(at: Any) -> None:
+        tell(f"following {model}: {at.points} points, {parameter} = {at.parameter:.6g}, {at.special} special")
+
+    system = system_from(model, chosen)
+    kinds = {"collocation": Collocation, "shooting": Shooting, "equilibrium": Equilibrium}
+    kinds["auto"] = Equilibrium if system.period is None else Collocation
+    options: dict[str, Any] = {"max_points": max_points, "progress": progress}
+    branches = [continuation(kinds[method](system), parameter, window, start=first or None, **options)]
+    for label in labels:
+        branches.append(continuation(switch(branches[-1][label]), parameter, window, **options))
+    return branches
+
+
+def _write(branches: list[Branch], path: Path, y: str | None) -> None:
+    ending = path.suffix.lower()
+    if ending == ".npz":
+        branches[-1].save(path)
+    elif ending == ".csv":
+        branches[-1].to_csv(path)
+    else:
+        from ..plots.style import SERIES
+        from ._pictures import write_picture
+
+        write_picture(path, lambda axes: [b.plot(axes, y=y, color=c) for b, c in zip(branches, SERIES * len(branches))])
+
+
+def _facts(branch: Branch) -> dict[str, Any]:
+    return {
+        "points": len(branch),
+        "status": str(branch.status),
+        "largest_residual": float(max(branch.residuals)),
+        "verdicts": {str(v): sum(w is v for w in branch.verdicts) for v in sorted(set(branch.verdicts))},
+        "special": [
+            {
+                "label": point.label,
+                "kind": str(point.kind),
+                branch.name: point.params[branch.name],
+                "criticality": None if point.criticality is None else str(point.criticality),
+            }
+            for point in branch.special
+        ],
+    }
+
+
+def _report(console: Console, branches: list[Branch], seconds: float, outputs: tuple[Path, ...]) -> None:
+    for branch in branches:
+        console.say(repr(branch), bold=True)
+        rows = []
+        for point in branch.special:
+            what = f"{point.kind}, {point.criticality}" if point.criticality else str(point.kind)
+            rows.append((point.label, f"{branch.name} = {point.params[branch.name]:.10g}", what))
+        console.table(rows)
+    console.say(f"  {seconds:.2f} s")
+    for path in outputs:
+        console.say(f"wrote {path}")
+    if not outputs:
+        console.say("add -o branch.npz (csv, png, svg, pdf) to keep it")

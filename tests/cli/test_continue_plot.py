@@ -1,0 +1,125 @@
+"""`stability continue` and `plot`. Witness: closed forms, known folds, and `stability.continuation` called directly."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import stability as st
+from stability.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+DUFFING = ["continue", "duffing", "--set", "beta=0.001", "--parameter", "Omega", "--range", "0.8:1.6"]
+LORENZ = ["continue", "lorenz", "--parameter", "rho", "--range", "0:30"]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_folds_of_the_duffing_oscillator(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Folds at 1.380933030 and 1.088436639 (an independent multiple-shooting solve); files hold the same branch."""
+    assert main([*DUFFING, "--json", "-o", "b.npz", "-o", "b.csv", "-o", "b.png"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    (facts,) = document["branches"]
+    places = [point["Omega"] for point in facts["special"] if point["kind"] == "fold"]
+    assert np.allclose(places, [1.380933030, 1.088436639], atol=1e-8, rtol=0)
+    stored = st.load("b.npz")
+    assert len(stored) == facts["points"] and stored.labels == ("LP1", "LP2")
+    with (folder / "b.csv").open(newline="") as stream:
+        column = [float(row["Omega"]) for row in csv.DictReader(stream)]
+    assert np.array_equal(column, stored.parameter)
+    assert (folder / "b.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_switching_to_the_branch_that_is_born(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Lorenz: pitchfork at rho = 1, Hopf points of both halves at 470/19."""
+    assert main([*LORENZ, "--switch", "BP1", "--json"]) == 0
+    first, born = json.loads(capsys.readouterr().out)["branches"]
+    assert abs(first["special"][0]["rho"] - 1) < 1e-9
+    hopf = [point["rho"] for point in born["special"] if point["kind"] == "Hopf"]
+    assert len(hopf) == 2 and np.allclose(hopf, 470 / 19, atol=1e-8, rtol=0)
+    assert not list(folder.iterdir())
+
+
+def test_report_names_the_points(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(LORENZ) == 0
+    assert "BP1  rho = 1  branch point" in capsys.readouterr().out
+
+
+def test_start_of_a_branch(capsys: pytest.CaptureFixture[str]) -> None:
+    """From a state near x = y = sqrt(8/3 (rho - 1)) the nontrivial equilibria are followed."""
+    arguments = ["continue", "lorenz", "--parameter", "rho", "--range", "15:30", "--json"]
+    assert main([*arguments, "--start", "x=6", "--start", "y=6", "--start", "z=14"]) == 0
+    (facts,) = json.loads(capsys.readouterr().out)["branches"]
+    assert abs(facts["special"][0]["rho"] - 470 / 19) < 1e-8
+
+
+MISTAKES = {
+    "no such parameter": ([*LORENZ[:3], "roh", *LORENZ[4:]], "did you mean 'rho'"),
+    "no range": (LORENZ[:4], "--range"),
+    "half a range": ([*LORENZ[:5], "3"], "from:to"),
+    "empty range": ([*LORENZ[:5], "3:3"], "differ"),
+    "no such point": ([*LORENZ, "--switch", "PD1"], "PD1"),
+    "nothing is born there": ([*DUFFING, "--switch", "LP1"], "LP1"),
+    "equilibria of a forced system": ([*DUFFING, "--method", "equilibrium"], "Collocation"),
+    "format": ([*LORENZ, "-o", "a.txt"], ".npz"),
+    "no stored file": (["plot", "none.npz"], "none.npz"),
+}
+
+
+@pytest.mark.parametrize("case", MISTAKES)
+def test_a_mistake_is_one_sentence(case: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments, expected = MISTAKES[case]
+    assert main(arguments) == 2
+    captured = capsys.readouterr()
+    assert expected in captured.err and "Traceback" not in captured.err
+    assert not list(folder.iterdir())
+
+
+def test_a_branch_that_breaks_off_is_written_and_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """x' = sqrt(mu) - x has no equilibrium beyond mu = 0. Exit code 1 tells a script; what was computed is kept."""
+    (folder / "edge.toml").write_text(
+        'name = "edge"\ncoordinates = ["x"]\nequations = ["x\' = sqrt(mu) - x"]\n[parameters]\nmu = 1.0\n'
+    )
+    assert main(["continue", "edge.toml", "--parameter", "mu", "--range", "1:-1", "-o", "a.npz", "--json"]) == 1
+    (facts,) = json.loads(capsys.readouterr().out)["branches"]
+    assert facts["status"] in ("step too small", "diverged")
+    stored = st.load("a.npz")
+    assert len(stored) > 5 and stored.parameter.min() >= 0
+
+
+def test_plot_draws_what_was_stored(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*DUFFING, "-o", "b.npz"]) == 0
+    assert main(["plot", "b.npz", "--y", "u.max"]) == 0
+    assert (folder / "b.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["plot", "b.npz"]) == 2, "it is there already"
+    assert main(["plot", "b.npz", "--y", "u.maxx", "-o", "c.png"]) == 2
+    assert "did you mean 'u.max'" in capsys.readouterr().err
+    assert main(["plot", "b.npz", "--kind", "class", "-o", "c.png"]) == 2
+    assert "not drawn with --kind" in capsys.readouterr().err
+    assert sorted(p.name for p in folder.iterdir()) == ["b.npz", "b.png"]
+
+
+def test_plot_refuses_a_damaged_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "a.npz").write_bytes(b"PK\x03\x04 not an archive")
+    assert main(["plot", "a.npz"]) == 2
+    assert "a.npz" in capsys.readouterr().err and not (folder / "a.png").exists()
+
+
+def test_plot_loads_no_solver(folder: Path) -> None:
+    """A stored branch is drawn without scipy, numba or sympy."""
+    assert main([*LORENZ, "-o", "a.npz"]) == 0
+    program = "import sys; from stability.cli import main; code = main(['plot', 'a.npz']); " \
+              "sys.exit(code or bool({'scipy', 'numba', 'sympy'} & set(sys.modules)))"
+    run = subprocess.run([sys.executable, "-c", program], env={**os.environ, "PYTHONPATH": str(ROOT)}, cwd=folder)
+    assert run.returncode == 0
