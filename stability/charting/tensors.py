@@ -83,7 +83,7 @@ def _build(
     """A converged tile, or the direction in which the box has to be split."""
     x, y = _mesh(box, 2, 2)
     clock = sampler.clock(x, y)
-    target = 2e-4 * tolerance / float(clock[0].max())
+    target = 4e-4 * tolerance / float(clock[0].max())
     steps, step_error = _choose_steps(sampler, x, y, target)
     dx = dy = _FIRST
     values = _sample(sampler, box, dx, dy, steps, None)
@@ -129,14 +129,14 @@ def _choose_steps(sampler: Sampler, x: Array, y: Array, target: float) -> tuple[
     steps, error = 16, np.inf
     before = sampler.fields(x, y, steps)
     while True:
-        ratio = 2.0 if not np.isfinite(error) else (error / (0.1 * target)) ** 0.125
+        ratio = 2.0 if not np.isfinite(error) else (error / (0.25 * target)) ** 0.125
         old, steps = steps, 2 * int(np.ceil(0.5 * steps * min(2.0, max(1.3, ratio))))
         now = sampler.fields(x, y, steps)
-        scale = np.maximum(1.0, np.abs(now).max(axis=0))
         # the difference is the error of the coarser value; that of the finer one is smaller by the order 8
-        error = float((np.abs(now - before).max(axis=0) / scale).max()) / ((steps / old) ** 8 - 1.0)
-        if error <= 0.2 * target or steps >= _MAX_STEPS or error <= 2e-16 * steps or not np.isfinite(error):
-            return steps, 4.0 * error * float(scale.max())
+        error = float(np.abs(now - before).max()) / ((steps / old) ** 8 - 1.0)
+        floor = 2e-16 * steps * float(np.abs(now).max())
+        if error <= max(0.5 * target, floor) or steps >= _MAX_STEPS or not np.isfinite(error):
+            return steps, 2.0 * error
         before = now
 
 
