@@ -37,6 +37,8 @@ _HOMES = {
     "fixed-point": "results.solutions",
     "periodic-orbit": "results.solutions",
     "stability-chart": "results.chart",
+    "trajectory": "results.trajectory",
+    "sweep": "results.sweep",
 }
 T = TypeVar("T", bound=type)
 

@@ -1,0 +1,1 @@
+"""Simulation: single motions, frequency sweeps, Poincare sections, Lyapunov exponents, basins."""
