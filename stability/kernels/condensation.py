@@ -259,7 +259,10 @@ def solve_stages(A, h, sigma, J, kept, position, LU, pivots, columns):  # type: 
 
 @kernel
 def solve_stages_transposed(A, h, sigma, J, kept, position, LU, pivots, columns):  # type: ignore[no-untyped-def]
-    """Overwrite `columns` (N, mn) by G^-T columns: G'^T y_v = c_v + h sigma A^T c_x, y_x = A^T (c_x + h sigma J_x^T y_v)."""
+    """Overwrite `columns` (N, mn) by G^-T columns.
+
+    G'^T y_v = c_v + h sigma A^T c_x,  y_x = A^T (c_x + h sigma J_x^T y_v)
+    """
     intervals = columns.shape[0]
     degree, small, n = A.shape[0], kept.shape[0], J.shape[1]
     size = degree * small

@@ -212,7 +212,7 @@ def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent
     Parameters: X (N, mn, K) = G^-1 C and nodes (N+1, n, K), the columns of the node equations (last: the boundary
     condition); the first q of the K columns belong to unknown parameters. rows (q, N, mn), node_rows (q, N+1, n),
     corner (q, K). `tangent` = 1 adds one right side: zero but for a 1 in the last border row.
-    Returns node corrections (sides, N+1, n), stage corrections (sides, N, mn), parameters (sides, q), sign (0: singular).
+    Returns node corrections (sides, N+1, n), stage corrections (sides, N, mn), parameters (sides, q), sign or 0.
     """
     intervals, size, extra = X.shape
     n = Z.shape[2]

@@ -5,8 +5,8 @@ and scales D = diag(scales of the states), spectral matrix and core are (y = D^-
 
     M = D^-1 S^-1 Phi D,      core = M - I   (forced),      core = [[M - I, D^-1 S^-1 dx(1)/dtau], [phase row]].
 
-Gradients of g = w^T M v and w^T [core, s_free] v follow from one forward sweep (the variation V, tau, lambda that starts
-at v) and one backward sweep (omega, from w): the stage residual is R = W (Y - u) - h sigma f, so with z = (x, p)
+Gradients of g = w^T M v and w^T [core, s_free] v follow from one forward sweep (the variation V, tau, lambda that
+starts at v) and one backward sweep (omega, from w): the stage residual is R = W (Y - u) - h sigma f, so with z = (x, p)
 
     dg = sum h omega^T d( sigma f_z (V, lambda) + (span tau + sigma_lambda lambda) f ),
 
@@ -306,7 +306,7 @@ class CollocationLinearisation:
         return mesh.join(np.zeros((N + 1, n)), g_state, rest), g_params
 
     def _second(self, direction: Array) -> Array:
-        """f_zz[direction, e_k] for all k: (n + m, count, n), one batched call; unit directions of the variables' size."""
+        """f_zz[direction, e_k] for all k: (n + m, count, n), one batched call; units of the variables' size."""
         mesh, problem = self.mesh, self.problem
         count, width = direction.shape
         states = np.ascontiguousarray(mesh.split(self.u)[1].reshape(count, mesh.n))
@@ -316,6 +316,7 @@ class CollocationLinearisation:
             return np.zeros((width, count, mesh.n))
         units = np.repeat(np.diag(sizes), count, axis=0)
         values = problem.evaluations.second(
-            np.tile(mesh.phase, width), np.tile(states, (width, 1)), self.params, np.tile(direction / length, (width, 1)), units
+            np.tile(mesh.phase, width), np.tile(states, (width, 1)), self.params,
+            np.tile(direction / length, (width, 1)), units
         )
         return np.asarray(values.reshape(width, count, mesh.n) * (length / sizes)[:, None, None])
