@@ -35,7 +35,8 @@ _POSITIVE = (1e-12, float("inf"))
 
 
 def _dimensionless(
-    length_ratio: Any, values: dict[str, float], base_term: bool, bounds: dict[str, Any], **others: Any
+    length_ratio: Any, values: dict[str, float], base_term: bool, bounds: dict[str, Any], scale: dict[str, int],
+    **others: Any,
 ) -> System:
     u, th = sp.Function("u")(t), sp.Function("theta")(t)
     x1, x2, lm, W0, W = sp.symbols("xi1 xi2 mass_ratio_total Omega0 Omega", real=True)
@@ -55,6 +56,7 @@ def _dimensionless(
         angles=("theta",),
         outputs=dict(u_absolute=u + sp.cos(W * t)),
         units=dict(theta="rad"),
+        orders=dict(xi1=1, xi2=1, u=-1, theta=1, **scale),
         name="autoparametric_pendulum",
         **others,
     )
@@ -119,7 +121,7 @@ def autoparametric_pendulum(
         xi1=xi1, xi2=xi2, mass_ratio_total=mass_ratio_total, length_ratio=length_ratio, Omega0=Omega0, Omega=Omega
     )
     return _dimensionless(
-        sp.Symbol("length_ratio", real=True), values, base_term, dict(length_ratio=_POSITIVE),
+        sp.Symbol("length_ratio", real=True), values, base_term, dict(length_ratio=_POSITIVE), dict(length_ratio=-2),
         description="mass on a spring that carries a pendulum, on a moving base",
     )  # fmt: skip
 
@@ -154,7 +156,7 @@ def from_acceleration(
         xi1=xi1, xi2=xi2, mass_ratio_total=mass_ratio_total, acceleration=acceleration, Omega0=Omega0, Omega=Omega
     )
     return _dimensionless(
-        W**2 / (acc * W0**2), values, base_term, dict(acceleration=(0, float("inf"))),
+        W**2 / (acc * W0**2), values, base_term, dict(acceleration=(0, float("inf"))), dict(acceleration=2),
         description="mass on a spring that carries a pendulum, at constant base acceleration (g)",
     )  # fmt: skip
 

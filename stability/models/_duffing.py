@@ -68,7 +68,7 @@ def duffing(*, xi: float = 0.02, beta: float = 0.001, Omega: float = 1.0, gravit
         parameters=dict(xi=xi, beta=beta, Omega=Omega, gravity=gravity),
         bounds=dict(Omega=_POSITIVE),
         outputs=dict(u_absolute=u + sp.cos(W * t)),
-        orders=dict(xi=1, beta=1),
+        orders=dict(xi=1, beta=3, gravity=1, u=-1),  # the base motion is 1, the response at resonance 1/eps
         name="duffing",
         description="Duffing's oscillator on a moving base",
     )

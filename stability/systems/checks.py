@@ -81,6 +81,8 @@ def _check_symbols(system: System) -> None:
         check(f"the equation of {s}", e, everything)
     for k, e in system.outputs.items():
         check(f"output '{k}'", e, everything)
+    for k, e in system.reconstruction.items():
+        check(f"the reconstruction of '{k}'", e, everything)
     if system.period_expression is not None:
         check("the period", system.period_expression, parameters)
     elif any(e.has(TIME) for e in system.rhs):
@@ -117,6 +119,8 @@ def checked_fields(system: System) -> dict[str, Any]:
         check_names("coordinate", [stop.coordinate], coordinates, f"'{system.name}'")
     for k in system.outputs:
         _check_name("output", k)
+    for k in system.reconstruction:
+        _check_name("reconstructed state", k)
     rhs = system.rhs
     if (rhs is None) == (system.function is None):
         raise EquationError("a system has either expressions or a function")

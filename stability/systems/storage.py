@@ -24,6 +24,7 @@ def to_plain(system: System, schema: str) -> dict[str, Any]:
     if system.function is not None or system.rhs is None:
         raise InputError(f"'{system.name}' is built around a Python function, which is not data and cannot be written")
     period = system.period_expression
+    slow = {k: to_tree(e) for k, e in system.reconstruction.items()}
     return {
         "schema": schema,
         "name": system.name,
@@ -41,6 +42,7 @@ def to_plain(system: System, schema: str) -> dict[str, Any]:
         "stops": [[s.coordinate, s.position, s.side, s.restitution] for s in system.stops],
         "base": None if system.base is None else [system.base.parameter, to_tree(system.base.angular_frequency)],
         "description": system.description,
+        **({"reconstruction": [[k, e] for k, e in slow.items()]} if slow else {}),
     }
 
 
@@ -64,6 +66,7 @@ def from_plain(data: Mapping[str, Any]) -> dict[str, Any]:
             "stops": tuple(HardStop(str(c), float(x), int(s), float(e)) for c, x, s, e in data["stops"]),
             "base": None if base is None else BaseMotion(str(base[0]), from_tree(base[1])),
             "description": str(data["description"]),
+            "reconstruction": {str(k): from_tree(e) for k, e in data.get("reconstruction", ())},
         }
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, FileFormatError):

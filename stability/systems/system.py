@@ -75,6 +75,8 @@ class System(Constructors):
         Scaling orders: the power of the small parameter that a parameter carries (used by averaging).
     stops : tuple of HardStop
         Walls that limit coordinates.
+    reconstruction : mapping of str to sympy expression
+        For a slow flow: the states of the original system in the slow states, the parameters and ``t``.
     base : BaseMotion or None
         Which parameter is the base amplitude or acceleration, and the angular frequency (for `with_excitation`).
     description : str
@@ -110,6 +112,7 @@ class System(Constructors):
     angles: tuple[str, ...] = ()
     orders: Mapping[str, int] = field(default_factory=dict)
     stops: tuple[Any, ...] = ()
+    reconstruction: Mapping[str, sp.Expr] = field(default_factory=dict)
     base: BaseMotion | None = None
     description: str = ""
     function: Callable[..., Any] | None = None
@@ -118,7 +121,7 @@ class System(Constructors):
     def __post_init__(self) -> None:
         from .checks import checked_fields
 
-        for key in ("parameters", "outputs", "units", "bounds", "orders"):
+        for key in ("parameters", "outputs", "units", "bounds", "orders", "reconstruction"):
             object.__setattr__(self, key, _frozen(getattr(self, key)))
         for key, value in checked_fields(self).items():
             object.__setattr__(self, key, _frozen(value) if isinstance(value, Mapping) else value)

@@ -1,0 +1,1 @@
+"""Perturbation methods and closed forms: averaging, multiple scales, transition curves, exact conservative motion."""
