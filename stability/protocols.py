@@ -217,10 +217,10 @@ class Problem(Protocol):
     def linearise(self, u: Array, params: Array) -> Linearisation:
         """The linearisation at any point, a solution or not."""
 
-    def spectrum(self, linearisation: Linearisation) -> Spectrum:
+    def spectrum(self, linearisation: Any) -> Spectrum:
         """Values without the trivial ones, counts, verdict."""
 
-    def adapt(self, u: Array, params: Array, tangent: Tangent) -> tuple[Problem, Array, Tangent] | None:
+    def adapt(self, u: Array, params: Array, tangent: Any) -> tuple[Any, Array, Any] | None:
         """A better mesh or scales for this solution, with u and tangent carried over (to be corrected); None: keep."""
 
     def measures(self, u: Array, params: Array) -> dict[str, float]:

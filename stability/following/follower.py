@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,10 +20,11 @@ from numpy.typing import NDArray
 
 from ..protocols import Corrected, Tangent
 from ..words import Kind, Status
-from .events import changes, crossed, dip_of, double_turn
+from .events import changes
 from .locating import Found, Locator
 from .loops import Home, collapsed
 from .points import Point, dot, make_point
+from .searching import between, hopped
 from .settings import Progress, Settings
 from .stepping import KINK, Comparison, compare, next_length, predict
 
@@ -32,8 +34,11 @@ Array = NDArray[np.float64]
 _ADAPT_EVERY = 3
 _GROWTH = 1e6
 _STALL_POINTS, _STALL, _STALL_LENGTH = 30, 1e-8, 0.05
-_DIP = 0.15
 _PATIENCE = 6
+
+
+def _gap(value: float, point: Point) -> float:
+    return point.parameter - value
 
 
 class Entry(NamedTuple):
@@ -104,11 +109,12 @@ class Follower(Iterator[Point]):
             if isinstance(made, float):
                 h *= made
                 continue
-            found, doubtful = self._bifurcations(self.last, made[0])
+            found, doubtful = between(self.locator, self.before, self.last, made[0])
+            found = [f for f in found if not self._known(f)]
             strange = any(f.kind is Kind.UNEXPLAINED for f in found)
             if not (strange or doubtful) or doubts >= _PATIENCE:
                 return *made, found
-            if doubts and not strange and not self._hopped(self.last, made[0]):
+            if doubts and not strange and not hopped(self.locator, self.last, made[0]):
                 return *made, found
             # a crossing was foretold and is not there, or one that nothing explains: is this point on another branch?
             doubts += 1
@@ -262,7 +268,7 @@ class Follower(Iterator[Point]):
             return  # an event lies within the discretisation error: leave the mesh until it is passed
         self._growth *= self._norm_of(old) / max(self._norm_of(new), 1e-300)
         self.since_adapt = 0
-        self.last, self.before = new, None
+        self.last = new
         where = max(i for i, e in enumerate(self.entries) if e.point is old)
         self.entries[where] = Entry(new, self.entries[where].found)
 
@@ -284,9 +290,8 @@ class Follower(Iterator[Point]):
                 if (p.parameter - value) * (q.parameter - value) < 0:
                     point = self.locator.at_parameter(p, q, value)
                     if point is None:
-                        point = self.locator.zero(
-                            p, q, lambda z, v=value: z.parameter - v, p.parameter - value, q.parameter - value
-                        )
+                        gap = partial(_gap, value)
+                        point = self.locator.zero(p, q, gap, gap(p), gap(q))
                     if point is not None:
                         found.append(Found(point, Kind.USER, (p.parameter, q.parameter), 0.0))
         return found
@@ -307,36 +312,6 @@ class Follower(Iterator[Point]):
                         found.append(Found(point, Kind.USER, (p.parameter, q.parameter), 0.0, name))
         return found
 
-    def _bifurcations(self, a: Point, b: Point) -> tuple[list[Found], bool]:
-        """Events that the integers at a and b show, and in-and-out changes that they do not.
-
-        The flag tells that a crossing foretold by a parabola between a and b could not be found.
-        """
-        p = self.before
-        known = p is not None and p.problem is a.problem
-        here, behind = [a, b], [p, a] if known else []
-        x = double_turn(a, b)
-        cuts = [] if x is None else [(x, 3, 0.0)]
-        if p is not None and known:
-            for which in self._tests(b):
-                dip = dip_of((p, a, b), which)
-                if dip is not None and dip.depth < _DIP:
-                    cuts.append((dip.at, which, dip.depth))
-        doubtful = False
-        for x, which, depth in cuts:
-            knots = here if x > a.s else behind
-            between = self._turning_point(knots[0], knots[-1], which, x)  # type: ignore[arg-type]
-            if between is not None:
-                knots.append(between)
-                knots.sort(key=lambda q: q.s)  # type: ignore[union-attr]
-            elif depth < 0 and knots is here and len(here) == 2:
-                doubtful = True
-        found: list[Found] = []
-        for knots in (behind if len(behind) > 2 else [], here):
-            for q, r in pairwise(knots):
-                found += self.locator.resolve(q, r)  # type: ignore[arg-type]
-        return [f for f in found if not self._known(f)], doubtful and not found
-
     def _known(self, found: Found) -> bool:
         """Whether this event is among the entries already (a segment that is searched again)."""
         for entry in reversed(self.entries):
@@ -346,52 +321,3 @@ class Follower(Iterator[Point]):
             if same and abs(entry.point.s - found.point.s) < 1e-6:
                 return True
         return False
-
-    def _hopped(self, a: Point, b: Point) -> bool:
-        """Whether a branch point lies between a and b though the determinant kept its sign: b is on another branch."""
-        return self.locator.attempt(Kind.BRANCH_POINT, a, b) is not None
-
-    @staticmethod
-    def _tests(b: Point) -> list[int]:
-        """Test functions to watch for dips; -1 stands for the single values."""
-        if not b.spectrum.values.size:
-            return [3]
-        critical = b.problem.critical
-        return [3, 0, -1] + [1] * (critical.minus is not None)
-
-    def _turning_point(self, a: Point, b: Point, which: int, x: float) -> Point | None:
-        """Minimise the test over the segment by parabolas: a point where it has crossed zero, or None."""
-        known = [a, b]
-        for _ in range(20):
-            new = self._inside(a, b, x)
-            if new is None or min(abs(new.s - p.s) for p in known) < 1e-9:
-                return None
-            known.append(new)
-            known.sort(key=lambda p: p.s)
-            here = next(k for k, p in enumerate(known) if p is new)
-            i = min(max(here, 1), len(known) - 2)
-            triple = (known[i - 1], known[i], known[i + 1])
-            if crossed((a, new, b), which) or crossed(triple, which):
-                return new
-            dip = dip_of(triple, which)
-            if dip is None:
-                return None
-            low = min(range(3), key=lambda k: abs(dip.values[k]))
-            if low != 1 and 0 < i - 1 + low < len(known) - 1:  # the lowest point so far becomes the middle one
-                i += low - 1
-                triple = (known[i - 1], known[i], known[i + 1])
-                dip = dip_of(triple, which)
-                if dip is None:
-                    return None
-            lowest, x = triple[1], dip.at
-            if abs(x - lowest.s) < 0.1 * dip.width:
-                if triple[2].s - triple[0].s < 8 * dip.width:
-                    return None  # the minimum is sampled closely, and it is not zero
-                side = 1 if triple[2].s - lowest.s > lowest.s - triple[0].s else -1
-                x = lowest.s + side * 2 * dip.width
-        return None
-
-    def _inside(self, a: Point, b: Point, s: float) -> Point | None:
-        """The point of the curve near arclength s, kept off the ends of the segment."""
-        width = b.s - a.s
-        return self.locator.on_curve(a, b, min(0.995, max(0.005, (s - a.s) / width))) if width > 0 else None

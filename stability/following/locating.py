@@ -312,7 +312,8 @@ def _signature(kind: Kind, located: Located, point: Point) -> bool:
     if kind is Kind.BRANCH_POINT:
         return abs(float(located.extra[0])) < _UNFOLDING
     if kind is Kind.PERIOD_DOUBLING:
-        return bool(np.min(np.abs(values - critical.minus)) < allowed) if values.size else False
+        near = np.abs(values - (critical.minus or 0.0))
+        return bool(values.size) and float(near.min()) < allowed
     extra, paired = float(located.extra[0]), values[values.imag != 0]
     if not paired.size:
         return False

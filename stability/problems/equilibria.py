@@ -19,7 +19,6 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,138 +27,15 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError, InputError, NonFiniteError
 from ..protocols import Corrected, Critical, Seed, Spectrum, Tangent
 from ..results.solutions import FixedPoint
-from ..words import Kind, Verdict
+from ..words import Kind
+from .equilibrium_linearisation import DenseLinearisation, eigenvalue_spectrum, equilibrated_solve
 
-__all__ = ["DenseLinearisation", "Equilibrium", "eigenvalue_spectrum"]
+__all__ = ["Equilibrium"]
 
 Array = NDArray[np.float64]
 _CRITICAL = Critical(circle=False, pair=Kind.HOPF, minus=None)
 _NO_PHASE = np.zeros(1)
 _MAX_NEWTON = 10
-
-
-def eigenvalue_spectrum(matrix: Array, floor: float) -> Spectrum:
-    """Counts and verdict of a Jacobian's eigenvalues; `floor` is the error of the matrix relative to its norm."""
-    values = np.linalg.eigvals(matrix).astype(complex)
-    if values.size > 1:
-        values = values[np.argsort(-values.real, kind="stable")]
-    error = floor * math.sqrt(float(np.einsum("ij,ij->", matrix, matrix)))
-    real = pairs = 0
-    for value in values.tolist():
-        if value.real <= 0:
-            break
-        if value.imag == 0:
-            real += 1
-        elif value.imag > 0:
-            pairs += 1
-    top = float(values[0].real) if values.size else -math.inf
-    if top > error:
-        verdict = Verdict.UNSTABLE
-    else:
-        verdict = Verdict.STABLE if top < -error else Verdict.UNDETERMINED
-    return Spectrum(values, error, real + 2 * pairs, real, 0, pairs, verdict)
-
-
-@dataclass(frozen=True, eq=False)
-class DenseLinearisation:
-    """f, f_x, f_p at one point, in the scaled variables of an `Equilibrium` (see `protocols.Linearisation`)."""
-
-    problem: Equilibrium
-    u: Array
-    params: Array
-    F: Array
-    J: Array
-    Fp: Array
-
-    @property
-    def residual(self) -> Array:
-        """f(x, p), (n,)."""
-        return self.F
-
-    @cached_property
-    def spectral(self) -> Array:
-        """D^-1 f_x D, (n, n)."""
-        s = self.problem.scales
-        return self.J * s / s[:, None]
-
-    @property
-    def core(self) -> Array:
-        """The same as `spectral`."""
-        return self.spectral
-
-    def column(self, name: str) -> Array:
-        """df/dp_name, (n,)."""
-        return self.Fp[:, self.problem.index(name)]
-
-    def core_column(self, name: str) -> Array:
-        """D^-1 df/dp_name, (n,)."""
-        return self.column(name) / self.problem.scales
-
-    def solve(self, rows: Array, columns: Array, corner: Array, right_sides: Array) -> Array:
-        """The bordered solve of `protocols.Linearisation`, in scaled and equilibrated form."""
-        n, q = self.F.size, columns.shape[1]
-        s = self.problem.scales
-        K = np.empty((n + q, n + q))
-        K[:n, :n] = self.spectral
-        K[:n, n:] = columns / s[:, None]
-        K[n:, :n] = rows * s
-        K[n:, n:] = corner
-        b = np.array(right_sides, dtype=float)
-        b[:n] /= s[:, None]
-        x = _equilibrated_solve(K, b)
-        x[:n] *= s[:, None]
-        return x
-
-    def spectral_gradient(self, w: NDArray[Any], v: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Gradient of w^T D^-1 f_x D v: second derivatives of f in the directions (D v, e_i), one batch."""
-        return self._gradient(w, v, np.zeros(self.params.size))
-
-    def core_gradient(self, w: NDArray[Any], v: NDArray[Any], free: str) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Gradient of w^T [S, s_free] v."""
-        direction = np.zeros(self.params.size, dtype=np.result_type(v, float))
-        direction[self.problem.index(free)] = v[-1]
-        return self._gradient(w, v[:-1], direction)
-
-    def _gradient(
-        self, w: NDArray[Any], v: NDArray[Any], v_params: NDArray[Any]
-    ) -> tuple[NDArray[Any], NDArray[Any]]:
-        n, m = self.F.size, self.params.size
-        s = self.problem.scales
-        z = np.concatenate([v * s, v_params])
-        # unit directions of the size of the variables, so that difference-based second derivatives are well scaled
-        sizes = np.concatenate([s, np.maximum(np.abs(self.params), 1e-3)])
-        W = np.diag(sizes)
-        parts = [z.real, z.imag] if np.iscomplexobj(z) and np.any(z.imag) else [z.real]
-        D = 0
-        for k, part in enumerate(parts):
-            length = np.max(np.abs(part) / sizes)
-            if length == 0:
-                continue
-            V = np.broadcast_to(part / length, (n + m, n + m))
-            second = self.problem.evaluations.second(
-                np.zeros(n + m), np.tile(self.u, (n + m, 1)), self.params, np.ascontiguousarray(V), W
-            )
-            D = D + (1j if k else 1.0) * length * second
-        gradient = (np.asarray(D) / sizes[:, None]) @ (w / s) if np.ndim(D) else np.zeros(n + m)
-        return gradient[:n], gradient[n:]
-
-    def embed(self, w: NDArray[Any]) -> NDArray[Any]:
-        """D w: the right side of f whose core part is w."""
-        return w * self.problem.scales
-
-    def lift(self, v: NDArray[Any], free: str | None = None) -> NDArray[Any]:
-        """D v (without its last entry, which belongs to the parameter, if `free` is given)."""
-        return (v if free is None else v[:-1]) * self.problem.scales
-
-
-def _equilibrated_solve(K: Array, b: Array) -> Array:
-    """K^-1 b with rows scaled to one; non-finite numbers where K is singular."""
-    size = np.abs(K).max(axis=1)
-    size[size == 0] = 1.0
-    try:
-        return np.asarray(np.linalg.solve(K / size[:, None], b / size[:, None]))
-    except np.linalg.LinAlgError:
-        return np.full_like(b, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,7 +174,7 @@ class Equilibrium:
             K[:n, n] = Fp[0, :, k] / (s * weight)
             rhs[:n, 0] = -F[0] / s
             rhs[n, 0] = -(float(row[:n] @ (y - y0)) + row[n] * weight * (params[k] - l0))
-            solution = _equilibrated_solve(K, rhs)
+            solution = equilibrated_solve(K, rhs)
             step = solution[:, 0]
             size = math.sqrt(float(step @ step))
             if not math.isfinite(size):
