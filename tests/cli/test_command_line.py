@@ -48,6 +48,7 @@ BAD = {
     "set twice": (["chart", "mathieu", "--set", "delta=0.1", "--set", "delta=0.2"], "set twice"),
     "no value": (["chart", "mathieu", "--set", "delta"], "name=value"),
     "word for a number": (["chart", "mathieu", "--set", "delta=large"], "delta"),
+    "truth for a number": (["chart", "mathieu", "--set", "delta=true"], "delta must be a number"),
     "not finite": (["chart", "mathieu", "--set", "delta=nan"], "finite"),
     "infinite": (["chart", "mathieu", "--x", "a:0:inf"], "finite"),
     "lo above hi": (["chart", "mathieu", "--x", "a:2:1"], "less than"),
@@ -128,6 +129,15 @@ def test_library_warnings_are_sentences(monkeypatch: pytest.MonkeyPatch, capsys:
     monkeypatch.setattr(module, "_list", lambda console: warnings.warn(TruncationWarning("7 harmonics"), stacklevel=1))
     assert main(["models"]) == 0
     assert capsys.readouterr().err == "warning: 7 harmonics\n"
+
+
+def test_trouble_in_a_python_model(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The user's own mistake: the file, the line and the exception, no traceback."""
+    file = tmp_path / "mine.py"
+    file.write_text("def mine():\n    return 1 / 0\n")
+    assert main(["models", f"{file}:mine"]) == 2
+    said = capsys.readouterr().err
+    assert "line 2: ZeroDivisionError" in said and "Traceback" not in said
 
 
 def test_started_by_a_shell(tmp_path: Path) -> None:
