@@ -164,15 +164,15 @@ def vertex(at: tuple[float, float, float], values: tuple[float, float, float]) -
 def dip_of(points: tuple[Point, Point, Point], which: int) -> Dip | None:
     """The dip of a test function: 0 plus, 1 minus, 2 pair (`points.smooth_tests`), 3 rate of the parameter.
 
-    -1: the deepest dip of any single value followed through the three (see `matched_growth`); a value that goes out and
-    comes back inside a step is smoother by itself than in a product with all the others.
+    -1, -2: the deepest dip of any single real, any complex value followed through the three (see `matched_growth`); a
+    value that goes out and comes back inside a step is smoother by itself than in a product with all the others.
     """
     p, q, r = points
     at = (p.s, q.s, r.s)
     if which >= 0:
         return vertex(at, (_test(p, which), _test(q, which), _test(r, which)))
-    growth = matched_growth(points)
     deepest = None
+    growth = matched_growth(points, which)
     size = np.abs(growth)
     for y0, y1, y2 in growth[:, (size[1] < size[0]) | (size[1] < size[2])].T.tolist():
         dip = vertex(at, (y0, y1, y2))
@@ -185,22 +185,46 @@ def _test(p: Point, which: int) -> float:
     return p.tests[which] if which < 3 else p.tangent.parameter
 
 
-def matched_growth(points: tuple[Point, Point, Point]) -> NDArray[np.float64]:
-    """(3, k) growth Re(lambda), or log|mu|, of the values that have one nearest neighbour in both other spectra."""
+def matched_growth(points: tuple[Point, Point, Point], which: int) -> NDArray[np.float64]:
+    """(3, k) growth Re(lambda), or log|mu|, of the real (-1) or complex (-2) values of the middle point and their like.
+
+    Values are matched to the nearest in the other two spectra, each used once.
+    """
     spectra = [p.spectrum.values for p in points]
-    first, last = (np.abs(spectra[1][:, None] - spectra[k][None, :]).argmin(axis=1) for k in (0, 2))
-    alone = (np.bincount(first)[first] == 1) & (np.bincount(last)[last] == 1)
-    matched = np.array([spectra[0][first[alone]], spectra[1][alone], spectra[2][last[alone]]])
+    middle = spectra[1]
+    if not spectra[0].size == middle.size == spectra[2].size:
+        return np.zeros((3, 0))
+    wanted = middle.imag == 0 if which == -1 else middle.imag > 0
+    if not wanted.any():
+        return np.zeros((3, 0))
+    matched = np.array([spectra[0][_assigned(middle, spectra[0])], middle, spectra[2][_assigned(middle, spectra[2])]])
+    matched = matched[:, wanted]
     if not points[0].problem.critical.circle:
         return matched.real
     with np.errstate(divide="ignore"):
         return np.asarray(np.log(np.abs(matched)))
 
 
+def _assigned(values: NDArray[np.complex128], others: NDArray[np.complex128]) -> NDArray[np.int64]:
+    """For every value the index of its partner: the nearest, or, where two want the same, the closest pairs first."""
+    gap = np.abs(values[:, None] - others[None, :])
+    nearest = gap.argmin(axis=1)
+    if len(set(nearest.tolist())) == values.size:
+        return nearest
+    partner = np.full(values.size, -1)
+    free = set(range(values.size))
+    for flat in np.argsort(gap, axis=None).tolist():
+        i, j = divmod(flat, values.size)
+        if partner[i] < 0 and j in free:
+            partner[i] = j
+            free.remove(j)
+    return partner
+
+
 def crossed(points: tuple[Point, Point, Point], which: int) -> bool:
-    """Whether the test function (-1: a single value) has the other sign at the middle point than at both ends."""
+    """Whether the test function (-1, -2: a single value) has another sign at the middle point than at both ends."""
     if which >= 0:
         y0, y1, y2 = (_test(p, which) for p in points)
         return y0 * y1 < 0 and y1 * y2 < 0
-    growth = matched_growth(points)
+    growth = matched_growth(points, which)
     return bool(((growth[0] * growth[1] < 0) & (growth[1] * growth[2] < 0)).any())

@@ -58,10 +58,10 @@ def hopped(locator: Locator, a: Point, b: Point) -> bool:
 
 
 def _tests(b: Point) -> list[int]:
-    """Test functions to watch for dips; -1 stands for the single values."""
+    """Test functions to watch for dips; -1 and -2 stand for single real and complex values."""
     if not b.spectrum.values.size:
         return [3]
-    return [3, 0, -1] + [1] * (b.problem.critical.minus is not None)
+    return [3, 0, -1, -2] + [1] * (b.problem.critical.minus is not None)
 
 
 def _turning_point(locator: Locator, a: Point, b: Point, which: int, x: float) -> Point | None:
