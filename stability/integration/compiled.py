@@ -34,6 +34,7 @@ class CompiledField:
     address, period_address : int;  0 for an autonomous system's period
     kept, position : int arrays, see kernels/condensation.py
     places : parameter name -> index in p
+    expressions : (right-hand sides or None, names of the states)
     """
 
     evaluations: Any
@@ -43,6 +44,7 @@ class CompiledField:
     kept: Array
     position: Array
     places: dict[str, int]
+    expressions: tuple[Any, tuple[str, ...]]
     keep_alive: Any = field(default=None, repr=False)
 
     @property
@@ -59,6 +61,18 @@ class CompiledField:
     def breaks(self, params: Array) -> Array:
         """Phases in [0, 1) where the field jumps."""
         return np.asarray(self.evaluations.breaks(params))
+
+    def divergence_free(self, params: Array) -> bool:
+        """Whether sum dF_i/dx_i vanishes identically at `params` (False for Python functions)."""
+        rhs, states = self.expressions
+        if rhs is None:
+            return False
+        import sympy
+
+        symbols = [sympy.Symbol(name, real=True) for name in states]
+        total = sum(sympy.diff(e, x) for e, x in zip(rhs, symbols))
+        values = {sympy.Symbol(name, real=True): sympy.Float(float(params[k])) for name, k in self.places.items()}
+        return bool(sympy.simplify(sympy.sympify(total).subs(values)) == 0)
 
     def period_second(self, params: Array, free: int) -> Array:
         """d2T / dp_free dp, (m,)."""
@@ -94,7 +108,8 @@ class CompiledField:
                 address = clock.address("FJP")
             else:
                 address, owner = _period_callback(evaluations)
-        return cls(evaluations, clock, evaluations.address("FJP"), address, kept, position, places, owner)
+        expressions = (system.rhs, tuple(system.states))
+        return cls(evaluations, clock, evaluations.address("FJP"), address, kept, position, places, expressions, owner)
 
 
 def _clock(system: Any) -> Any:

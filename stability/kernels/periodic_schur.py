@@ -122,8 +122,8 @@ def _blocks(turned: Array, triangles: Array) -> tuple[NDArray[np.complex128], fl
         part = _block(turned[low:high, low:high], triangles[:, low:high, low:high])
         logs[low:high] = part
         sizes = part.real[np.isfinite(part.real)]
-        if sizes.size == part.size and part.size > 1:
-            spread = max(spread, float(np.exp(min(np.ptp(sizes), 700.0))))
+        if part.size > 1:  # an eigenvalue that rounding made zero has an unknown size: the block must come apart
+            spread = max(spread, float(np.exp(min(np.ptp(sizes), 700.0))) if sizes.size == part.size else np.inf)
     return logs, spread
 
 

@@ -33,7 +33,7 @@ from ..protocols import Corrected, Spectrum, Tangent
 from .collocation_linearisation import CollocationLinearisation, Workspace
 from .orbit_adaption import adapted
 from .orbit_mesh import OrbitMesh
-from .orbit_spectrum import deflated, eigenvalues, orbit_spectrum, spectrum_distance
+from .orbit_spectrum import contracted, deflated, eigenvalues, orbit_spectrum, spectrum_distance
 from .orbit_starts import doubled_problem
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
 
@@ -315,7 +315,7 @@ class Collocation(OrbitDiscretisation):
     # ------------------------------------------------------------------ meshes and doubled orbits
     def adapt(
         self, u: Array, params: Array, tangent: Tangent | None
-    ) -> tuple[Collocation, Array, Tangent | None] | None:
+    ) -> tuple[Collocation, Array, Any] | None:
         """A better mesh or better scales (see `orbit_adaption`), or None."""
         return adapted(self, u, params, tangent)
 
@@ -358,7 +358,7 @@ class Collocation(OrbitDiscretisation):
             worst = max(worst, abs(float(refined[1][-1] - u[-1])) / float(u[-1]))
         return worst
 
-    def spectrum(self, linearisation: CollocationLinearisation) -> Spectrum:
+    def spectrum(self, linearisation: Any) -> Spectrum:
         """Multipliers, their error (by degree m + 1, and the trivial multiplier's distance from 1), counts, verdict."""
         M, error = linearisation.spectral, 0.0
         if not np.isfinite(M).all():
@@ -367,14 +367,41 @@ class Collocation(OrbitDiscretisation):
             direction = self._direction_of_flow(linearisation)
             M, error = deflated(M, direction)
         values = eigenvalues(M)
+        error += self._multiplier_error(linearisation, values, direction if self.mesh.own else None)
+        error += 1e-15 * float(np.abs(M).max()) * len(M)
+        values = contracted(values, linearisation.work.M) if not self.halved else values
+        return orbit_spectrum(values, error, self._area_preserving(linearisation))
+
+    def _multiplier_error(self, linearisation: CollocationLinearisation, values: Array, direction: Array | None) -> float:
+        """Change of the multipliers near the unit circle from degree m to m + 1.
+
+        Where no multiplier is near the circle, the change at an earlier point of the same mesh is carried over, times
+        3 and the square of the growth of the m-th derivative (up to 2): nodes have twice the order of the polynomial.
+        """
+        mesh = self.mesh
+        nodes, stages, _ = mesh.split(linearisation.solution)
+        size = float(np.abs(mesh.leading(nodes, stages) / self.scales).max())
+        known = self._memo.get("level")
+        if known is not None and 0 < size < 2 * known[1]:
+            carried = 3 * known[0] * max(1.0, size / known[1]) ** 2
+            if float(np.abs(np.abs(values) - 1).min(initial=1.0)) > 1e3 * carried + 1e-5:
+                return float(carried)
         refined = self.refined(linearisation.solution, linearisation.solution_params)
         if refined is None:
-            return orbit_spectrum(values, np.inf)
+            return math.inf
         other = self.spectral_of(refined[2].M)
-        if self.mesh.own:
+        if direction is not None:
             other = deflated(other, direction)[0]
-        error += spectrum_distance(values, eigenvalues(other)) + 1e-15 * float(np.abs(M).max()) * len(M)
-        return orbit_spectrum(values, error)
+        error = spectrum_distance(values, eigenvalues(other))
+        self._memo["level"] = (max(error, 1e-15), size)
+        return error
+
+    def _area_preserving(self, linearisation: CollocationLinearisation) -> bool:
+        """Whether a forced system of two states has no divergence, hence det M = 1."""
+        J = linearisation.work.J
+        if self.mesh.n != 2 or self.mesh.own or float(np.abs(J[:, 0, 0] + J[:, 1, 1]).max()) != 0.0:
+            return False
+        return self.flow.divergence_free(linearisation.params)
 
     def spectral_of(self, factors: Array) -> Array:
         """M of the node relations M_j (N, n, n)."""

@@ -17,10 +17,12 @@ import math
 
 import numpy as np
 
+from ..floquet.verdicts import classify
+from ..kernels.periodic_schur import product_eigenvalues
 from ..protocols import Spectrum
 from ..words import Verdict
 
-__all__ = ["deflated", "eigenvalues", "orbit_spectrum", "spectrum_distance"]
+__all__ = ["contracted", "deflated", "eigenvalues", "orbit_spectrum", "spectrum_distance"]
 
 Array = np.ndarray
 
@@ -60,8 +62,27 @@ def spectrum_distance(values: Array, others: Array) -> float:
     return worst
 
 
-def orbit_spectrum(values: Array, error: float) -> Spectrum:
-    """Counts and verdict of the non-trivial multipliers `values`, whose error near the unit circle is `error`."""
+def contracted(values: Array, factors: Array) -> Array:
+    """`values` with those below 1e-10 of the largest replaced by the relatively accurate ones of the factors' product.
+
+    Eigenvalues of a product that has been multiplied out are known to rounding of the largest only; the periodic QR
+    algorithm on the factors (N, n, n) knows them all. `values` may lack the trivial multiplier.
+    """
+    size = np.abs(values)
+    small = size < 1e-10 * max(1.0, float(size.max(initial=0.0)))
+    if not small.any():
+        return values
+    exact = product_eigenvalues(factors)
+    out = values.copy()
+    out[len(values) - int(small.sum()) :] = exact[len(exact) - int(small.sum()) :]
+    return out
+
+
+def orbit_spectrum(values: Array, error: float, neutral: bool = False) -> Spectrum:
+    """Counts and verdict of the non-trivial multipliers `values`, whose error near the unit circle is `error`.
+
+    neutral: the equations prove that multipliers come in pairs mu, 1/mu.
+    """
     plus = minus = pairs = 0
     radius = 0.0
     for value in values.tolist():
@@ -77,4 +98,6 @@ def orbit_spectrum(values: Array, error: float) -> Spectrum:
         verdict = Verdict.UNSTABLE
     else:
         verdict = Verdict.STABLE if radius < 1.0 - error else Verdict.UNDETERMINED
+        if neutral and verdict is Verdict.UNDETERMINED:
+            verdict = classify(values, error, neutral=True).verdict
     return Spectrum(values, error, plus + minus + 2 * pairs, plus, minus, pairs, verdict)

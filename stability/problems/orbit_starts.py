@@ -109,6 +109,15 @@ def _settled(problem: OrbitDiscretisation, u: Array, params: Array, what: str) -
     found = _newton(problem, u, params)
     if not found.converged:
         raise _failed(problem, params, found, what)
+    if problem.own:
+        states = problem.pieces(found.u, params)[2].reshape(-1, problem.system.n)
+        path = float(np.abs(problem.evaluations.F(None, states, params)).max()) * float(found.u[-1])
+        if path <= 1e-6 * max(float(np.abs(states).max()), 1e-9):
+            raise ConvergenceError(
+                f"Newton's method went from {what} to an equilibrium of '{problem.system.name}': "
+                "give a state near the orbit (its transients are integrated) or a better orbit",
+                u=found.u, params=params,
+            )  # fmt: skip
     return found.u
 
 

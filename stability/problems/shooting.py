@@ -28,7 +28,7 @@ from ..integration.flow import flow
 from ..kernels.gauss import gauss_rule
 from ..protocols import Corrected, Spectrum, Tangent
 from .orbit_adaption import state_scales
-from .orbit_spectrum import deflated, eigenvalues, orbit_spectrum, spectrum_distance
+from .orbit_spectrum import contracted, deflated, eigenvalues, orbit_spectrum, spectrum_distance
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
 from .shooting_linearisation import Segments, ShootingLinearisation
 
@@ -263,7 +263,7 @@ class Shooting(OrbitDiscretisation):
         right = tighter.residual / np.append(np.tile(self.scales, self.segments), [1.0] * self.own)
         return float(np.abs(np.linalg.lstsq(matrix, right, rcond=1e-7)[0]).max())
 
-    def spectrum(self, linearisation: ShootingLinearisation) -> Spectrum:
+    def spectrum(self, linearisation: Any) -> Spectrum:
         """Multipliers, their error (by a tighter tolerance, and the trivial multiplier), counts, verdict."""
         M, error = linearisation.spectral, 0.0
         tighter = self._tighter(linearisation.u, linearisation.params).spectral
@@ -276,7 +276,10 @@ class Shooting(OrbitDiscretisation):
             tighter = deflated(tighter, direction)[0]
         values = eigenvalues(M)
         error += spectrum_distance(values, eigenvalues(tighter)) + 1e-15 * float(np.abs(M).max()) * self.n
-        return orbit_spectrum(values, error)
+        J = self.evaluations.FJ(np.zeros(1), linearisation.u[None, : self.n], linearisation.params)[1][0]
+        neutral = self.n == 2 and not self.own and float(np.trace(J)) == 0.0
+        values = contracted(values, linearisation.parts.matrices)
+        return orbit_spectrum(values, error, neutral and self.flow.divergence_free(linearisation.params))
 
     def pieces(self, u: Array, params: Array) -> tuple[int, Array, Array, float]:
         """The steps of the integration as polynomials of degree 7."""
@@ -297,7 +300,7 @@ class Shooting(OrbitDiscretisation):
         all_edges[-1] = 1.0
         return _DENSE_DEGREE, all_edges, np.concatenate(values), period
 
-    def adapt(self, u: Array, params: Array, tangent: Tangent | None) -> tuple[Shooting, Array, Tangent | None] | None:
+    def adapt(self, u: Array, params: Array, tangent: Tangent | None) -> tuple[Shooting, Array, Any] | None:
         """New scales where the solution has outgrown the present ones by a factor of 2; else None."""
         scales = state_scales(self.pieces(u, params)[2].reshape(-1, self.n))
         period_scale = float(u[-1]) if self.own else 1.0

@@ -305,6 +305,36 @@ def test_tangent_and_arclength(case):
     assert second.determinant_sign in (-1, 1)
 
 
+def test_undamped_orbits_are_neutral_and_strong_contraction_is_known():
+    """xi = 0: area is preserved, det M = 1 (NEUTRAL, never STABLE). mu = 5: log of the multiplier by Liouville."""
+    problem, x, p = solved(Collocation(duffing(xi=0.0)))
+    spectrum = problem.spectrum(problem.linearise(x, p))
+    assert spectrum.verdict is Verdict.NEUTRAL
+    assert abs(np.prod(spectrum.values) - 1) < 1e-10
+    problem, x, p = solved(Collocation(van_der_pol(5.0), intervals=400), guess={"u": 2.0})
+    orbit = problem.view(x, p)
+    s, w = np.polynomial.legendre.leggauss(40)
+    edges = orbit.edges
+    times = (edges[:-1, None] + np.diff(edges)[:, None] * (s + 1) / 2).ravel()
+    weights = (np.diff(edges)[:, None] * w / 2).ravel()
+    divergence = weights @ (5 * (1 - orbit(times)[0] ** 2))
+    value = problem.spectrum(problem.linearise(x, p)).values[0]
+    assert abs(divergence + 85.4520) < 1e-3  # research: -85.4520
+    assert abs(np.log(value.real) - divergence) < 1e-3 * abs(divergence)
+
+
+def test_carried_error_of_the_multipliers_bounds_the_measured_one():
+    """Along a branch on one mesh, the error carried over is never below the one measured at the point itself."""
+    system = duffing(beta=0.001)
+    problem = Collocation(system, scales=[3.0, 3.0])
+    for value in np.linspace(0.5, 0.9, 9):
+        p = system.parameter_vector(Omega=value)
+        x = problem.start(p)
+        carried = problem.spectrum(problem.linearise(x, p)).error
+        fresh = dataclasses.replace(problem, _memo={})
+        assert carried >= fresh.spectrum(fresh.linearise(x, p)).error - 1e-14
+
+
 # ---------------------------------------------------------------------- branches
 @pytest.mark.parametrize("window", ((0.3, 3.0), (3.0, 0.3)))
 def test_folds_of_the_closed_duffing_peak(window):

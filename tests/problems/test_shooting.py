@@ -86,7 +86,7 @@ def case(request):
     system = (duffing, van_der_pol)[kind]()
     problem = Shooting(system, segments=segments, scales=[1.3, 2.0], rtol=1e-13, atol=1e-14)
     p = system.parameter_vector()
-    return problem, problem.start(p, circle() if kind else None), p, ("Omega", "mu")[kind]
+    return problem, problem.start(p, {"u": 2.0} if kind else None), p, ("Omega", "mu")[kind]
 
 
 def central(f, step):
