@@ -37,7 +37,7 @@ def rows(data: dict[str, Any]) -> list[tuple[str, str]]:
         ("unstable part of the chart", f"{unstable:.2%}"),
     ]
     for tip in sorted(chart.tips, key=lambda tip: tip.order):
-        first = f"   (averaging: a = 0.25, b = {2 * DELTA:g})" if tip.order == 1 else ""
+        first = f"  (averaging: b = {2 * DELTA:g})" if tip.order == 1 else ""
         table.append((f"tongue {tip.order} opens at", f"a = {tip.x:.10f}, b = {tip.y:.10f}{first}"))
     return table
 
