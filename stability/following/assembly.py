@@ -3,6 +3,7 @@ r"""From what the followers found to a frozen `Branch`: arrays, labels, and what
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -39,6 +40,19 @@ def _merged(entries: list[Entry]) -> list[Entry]:
                 continue
         kept.append(entry)
     return kept
+
+
+def _without_twins(entries: list[Entry]) -> list[Entry]:
+    """A branch is vertical where it crosses its parent at a pitchfork: a fold found beside that point is the point."""
+    marked = [k for k, e in enumerate(entries) if e.found is not None]
+    drop = set()
+    for i, j in pairwise(marked):
+        kinds = {entries[i].found.kind: i, entries[j].found.kind: j}  # type: ignore[union-attr]
+        p, q = entries[i].point, entries[j].point
+        near = abs(p.parameter - q.parameter) * p.tangent.weight < 1e-8 and abs(p.s - q.s) < 1e-2
+        if near and set(kinds) == {Kind.FOLD, Kind.BRANCH_POINT}:
+            drop.add(kinds[Kind.FOLD])
+    return [e for k, e in enumerate(entries) if k not in drop]
 
 
 def _same(p: Point, q: Point) -> bool:
@@ -107,7 +121,7 @@ def assemble(
     ends: tuple[Follower | None, Follower | None],
 ) -> Branch:
     """The branch that these entries are."""
-    entries = _merged(entries)
+    entries = _without_twins(_merged(entries))
     special, marks = _labelled(settings, entries)
     points = [e.point for e in entries]
     meshes: dict[int, Any] = {}

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError, InputError
 from ..protocols import Corrected, Problem, Seed, Tangent
 from ..results.branch import Branch
-from ..words import Status
+from ..words import Kind, Status
 from .assembly import assemble, resumed
 from .follower import Entry, Follower
 from .locating import Found
@@ -214,11 +214,14 @@ def _with_tangent(
 
 # ---------------------------------------------------------------------- born at a special point
 def _from_seed(seed: Seed, settings: Settings) -> Branch:
-    birth, sides = _sides(seed, settings)
-    for side in sides:
-        if side is not None:
-            side.run()
-    ahead, behind = sides
+    birth, (ahead, behind) = _sides(seed, settings)
+    if ahead is not None:
+        ahead.run()
+    if ahead is not None and ahead.status is Status.CLOSED_LOOP:
+        behind = None  # the loop came back along the other side
+        _end_at_birth(ahead, birth)
+    if behind is not None:
+        behind.run()
     if ahead is None and behind is None:
         raise ConvergenceError(
             f"no solution was found on the new branch near {settings.name} = {birth.parameter:.10g}; "
@@ -229,8 +232,19 @@ def _from_seed(seed: Seed, settings: Settings) -> Branch:
     entries = [Entry(birth, mark), *(ahead.entries if ahead else [])]
     if behind is not None:
         entries = [_turned(e) for e in reversed(behind.entries)] + entries
-    first = _ended(behind) if two else Status.STOPPED
+    closed = ahead is not None and ahead.status is Status.CLOSED_LOOP
+    first = Status.CLOSED_LOOP if closed and two else _ended(behind) if two else Status.STOPPED
     return assemble(settings, entries, (first, _ended(ahead)), (behind, ahead))
+
+
+def _end_at_birth(follower: Follower, birth: Point) -> None:
+    """A loop that came back to its branch point ends there, and the point is listed once."""
+    for k in range(len(follower.entries) - 1, 0, -1):
+        point, found = follower.entries[k]
+        again = found is not None and found.kind is Kind.BRANCH_POINT
+        if again and abs(point.parameter - birth.parameter) * birth.tangent.weight < 1e-7:
+            follower.entries[k:] = [Entry(point, None)]
+            return
 
 
 def _turned(entry: Entry) -> Entry:

@@ -146,10 +146,11 @@ class Locator:
         critical = a.problem.critical
         kinds = change.suspects(critical.pair, critical.minus is not None)
         located = [f for f in (self.attempt(kind, a, b) for kind in kinds) if f is not None]
-        single = _without_twin(change, located, chord_length(a, b))
-        if len(single) == 1 < len(located) and not change.collision:
-            return single
-        located = sorted(single, key=lambda f: f.point.s)
+        if _is_turning_crossing(change, located, chord_length(a, b)):
+            located = [f for f in located if f.kind is not Kind.FOLD]
+            if len(located) == 1 and not change.collision:
+                return located
+        located.sort(key=lambda f: f.point.s)
         if located and self._separate(a, b, located):
             return located
         if fine and located and change.explained([f.kind for f in located]):
@@ -236,17 +237,22 @@ class Locator:
         )
 
 
-def _without_twin(change: Changes, located: list[Found], length: float) -> list[Found]:
-    """A pitchfork met on its own side branch turns the parameter too: of fold and branch point there, the latter."""
+def _is_turning_crossing(change: Changes, located: list[Found], length: float) -> bool:
+    """A pitchfork met on its own side branch: the parameter turns and the determinant vanishes at one point.
+
+    The branch is vertical in the parameter there. The fold's own system is singular at such a point: it may be found
+    less accurately, or not at all.
+    """
     if not (change.fold and change.branch):
-        return located
+        return False
     places = {f.kind: f.point for f in located}
-    if Kind.FOLD not in places or Kind.BRANCH_POINT not in places:
-        return located
-    p, q = places[Kind.FOLD], places[Kind.BRANCH_POINT]
-    # the fold's own system is singular there, so its place along the curve is less accurate than its parameter
-    one = abs(p.parameter - q.parameter) * p.tangent.weight < 1e-8 and abs(p.s - q.s) < 0.1 * length + 1e-7
-    return [f for f in located if f.kind is not Kind.FOLD] if one else located
+    crossing, fold = places.get(Kind.BRANCH_POINT), places.get(Kind.FOLD)
+    if crossing is None:
+        return False
+    weight = crossing.tangent.weight
+    if fold is None:
+        return abs(crossing.tangent.parameter) * weight < 1e-3
+    return abs(fold.parameter - crossing.parameter) * weight < 1e-8 and abs(fold.s - crossing.s) < 0.1 * length + 1e-7
 
 
 def _secant(ga: float, gb: float) -> float:
