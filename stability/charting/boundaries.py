@@ -46,7 +46,7 @@ class Tracer:
         tips: list[TongueTip] = []
         for sampler, layer in zip(self.samplers, chart.layers, strict=True):
             for kind, level in _levels(layer):
-                found, bottoms = _curves_of(chart, level)
+                found, bottoms = _curves_of(chart, level, (31, 91) if layer.form == "matrix" else (101, 241))
                 for path in found:
                     for piece in _limits(chart, path):
                         middle = piece[len(piece) // 2]
@@ -198,15 +198,18 @@ def _largest_multiplier(layer: Layer) -> Level:
     return level
 
 
-def _curves_of(chart: StabilityChart, level: Level) -> tuple[list[Array], Array]:
-    """All zero curves of one level function in the window, and the points on them where y is least."""
+def _curves_of(chart: StabilityChart, level: Level, mesh: tuple[int, int]) -> tuple[list[Array], Array]:
+    """All zero curves of one level function in the window, and the points on them where y is least.
+
+    `mesh` (rows, columns) is where extremes along x are looked for.
+    """
     centre, half = _unit(chart)
 
     def function(u: Array, v: Array) -> tuple[Array, Array, Array]:
         g, gx, gy = level(centre[0] + half[0] * u, centre[1] + half[1] * v)
         return g, gx * half[0], gy * half[1]
 
-    rim, special = _distinct(rim_roots(function)), critical_points(function)
+    rim, special = _distinct(rim_roots(function)), critical_points(function, *mesh)
     _, gu, gv = function(rim[:, 0], rim[:, 1])
     # into the square: the tangent (-gv, gu) must point away from the side the root lies on
     side = np.abs(rim).argmax(axis=1)

@@ -65,7 +65,7 @@ def chart(
     about : None, equilibrium, periodic orbit, function of the parameters, or "linear"
         The solution whose stability is asked for; None is x = 0. See `linearise`.
     tolerance : float, 1e-13 to 1e-2
-        Wanted absolute error of the growth rate.
+        Wanted absolute error of the growth rate; at least 2e-12 / T is used.
     **params : float
         Other parameters, by name; missing ones keep the system's defaults.
 
@@ -112,6 +112,8 @@ def chart(
     corners = np.array([low, high])
     window = sampled_window(linear, low, (names.index(x_name), names.index(y_name)), (x_lo, x_hi, y_lo, y_hi))
     grid_x, grid_y = np.linspace(x_lo, x_hi, nx), np.linspace(y_lo, y_hi, ny)
+    # rounding forbids a growth rate better than some digits of 1/T, whatever the unit of time
+    tolerance = max(tolerance, 2e-12 / float(linear.period(corners).min()))
     samplers, layers = [], []
     picture: Picture | None = None
     error = 0.0

@@ -110,7 +110,11 @@ class Sampler:
         return fine + (fine - coarse) / 63.0
 
     def fields(self, x: Array, y: Array, steps: int) -> Array:
-        """The functions of the form at points x (N,), y (N,): (Q, N)."""
+        """The functions of the form at points x (N,), y (N,): (Q, N); infinite where they overflow."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self._fields(x, y, steps)
+
+    def _fields(self, x: Array, y: Array, steps: int) -> Array:
         if self.form == "hill":
             return self._half_period(x, y, steps)
         M = self._normalised(x, y, steps)

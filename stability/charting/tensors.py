@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 _FIRST, _LARGEST = 16, 64
 _MAX_TILES = 400
+_MAX_SPLIT_FOR_ERROR = 64  # beyond, a tile that converged is kept with the error it has
 _MAX_STEPS = 8192
 
 
@@ -48,7 +49,8 @@ def build_tiles(
         full = len(done) + len(waiting) >= _MAX_TILES
         if tile is not None and direction is None:
             error = worst(tile)
-            if error > tolerance and not full and error < 0.5 * inherited:
+            few = len(done) + len(waiting) < _MAX_SPLIT_FOR_ERROR
+            if error > tolerance and few and error < 0.5 * inherited:
                 kx, ky = tile.fields.shape[2], tile.fields.shape[1]
                 direction, inherited = ("x" if kx >= ky else "y"), error
         if direction is None or full:

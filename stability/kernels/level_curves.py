@@ -76,7 +76,7 @@ def rim_roots(function: Function, samples: int = 801) -> Array:
     return np.concatenate(found)
 
 
-def critical_points(function: Function, rows: int = 121, columns: int = 321) -> Array:
+def critical_points(function: Function, rows: int = 101, columns: int = 241) -> Array:
     """Points with G = G_u = 0 inside the square, (B, 2), and whether v is least there, in a third column (1 or 0)."""
     u, v = np.linspace(-1.0, 1.0, columns), np.linspace(-1.0, 1.0, rows)
     U, V = np.tile(u, rows), np.repeat(v, columns)
