@@ -1,4 +1,4 @@
-r"""Amplitude equations to second order by harmonics: averaging about the response frequency, multiple scales about omega.
+r"""Amplitude equations to second order by harmonics: averaging, and multiple scales.
 
 With q_i = A_i e^{i K_i phi} + conj + x_i1, the harmonic K_i of q_i'' + omega_i^2 q_i = g_i is, with W_i = K_i nu,
 
@@ -75,8 +75,8 @@ def _corrections(amplitudes: Amplitudes) -> Corrections:
             if term.rough:
                 shown = readable(term.expression(amplitudes.form.states))
                 raise EquationError(
-                    f"the term {shown} has infinitely many harmonics: averaging takes it to order 1 only; use order=1, or "
-                    "HarmonicBalance(system)"
+                    f"the term {shown} has infinitely many harmonics: averaging takes it to order 1 "
+                    "only; use order=1, or HarmonicBalance(system)"
                 )
             coefficient, series = amplitudes.harmonics(term)
             for k, element in series.items():
@@ -137,7 +137,7 @@ def averaged(form: StandardForm) -> AmplitudeEquations:
         motion = [_over_2iW(amplitudes, i, r) for i, r in enumerate(residual)]
         return AmplitudeEquations(amplitudes, tuple(motion), ({},) * n, tuple(residual), values)
     none: list[Terms] = [{} for _ in range(n)]
-    corrections = _corrections(amplitudes)
+    corrections: Corrections = _corrections(amplitudes)
     residual = [added(r, s) for r, s in zip(residual, _second(amplitudes, corrections, none))]
     means = [sp.Dummy(f"M{i}", positive=True) for i in range(n)]
     Z = [scaled(r, 1 / (2 * M), -1j) for r, M in zip(residual, means)]
@@ -164,7 +164,8 @@ def expanded(form: StandardForm) -> AmplitudeEquations:
     first = [
         added(_replaced(terms[i], at_natural), scaled({detuning[i]: amplitudes.A[i]}, sp.S.One, -1j)) for i in range(n)
     ]
-    motion, corrections = first, [{} for _ in range(n)]
+    motion = first
+    corrections: Corrections = [{} for _ in range(n)]
     if len(form.orders) > 1:
         corrections = [{k: _replaced(row, at_natural) for k, row in rows.items()} for rows in _corrections(amplitudes)]
         second = _second(amplitudes, corrections, first)

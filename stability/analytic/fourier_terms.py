@@ -3,8 +3,8 @@ r"""Exact harmonics of monomials on harmonic motion, in complex amplitudes.
     q_j = A_j e^{i K_j phi} + B_j e^{-i K_j phi} + h_j(phi),      B_j = conj A_j,     phi = nu t,
     q_j' = (W_j/K_j) dq_j/dphi,       W_j = K_j nu the response frequency of coordinate j,
 
-h_j the hard response with coefficients (C, S) for each of its harmonics. A quantity is kept as `Terms`: real coefficient
-(in the parameters) -> polynomial in the A, B, C, S over the Gaussian rationals, so that all products are exact.
+h_j the hard response with coefficients (C, S) for each of its harmonics. A quantity is kept as `Terms`: real
+coefficient (in the parameters) -> polynomial in A, B, C, S over the Gaussian rationals, so that products are exact.
 
 Rough terms |q|^s sgn^P(q) |q'|^r sgn^R(q') have the harmonic N of q = a cos psi by Gamma functions: with moments
 
@@ -35,11 +35,12 @@ Terms = dict[sp.Expr, PolyElement]
 def moment(s: sp.Expr, r: sp.Expr) -> sp.Expr:
     """The average of |cos|^s |sin|^r over a period.
 
-    >>> 2 * moment(sp.Integer(3), sp.Integer(0)) / 2 * 2
+    >>> 2 * moment(sp.Integer(3), sp.Integer(0))
     8/(3*pi)
     """
     s, r = sp.nsimplify(s), sp.nsimplify(r)
-    return sp.gamma((s + 1) / 2) * sp.gamma((r + 1) / 2) / (sp.pi * sp.gamma((s + r) / 2 + 1))
+    value = sp.gamma((s + 1) / 2) * sp.gamma((r + 1) / 2) / (sp.pi * sp.gamma((s + r) / 2 + 1))
+    return sp.Float(float(value)) if value.has(sp.gamma) else value
 
 
 def add(terms: Terms, coefficient: sp.Expr, element: PolyElement) -> None:

@@ -47,7 +47,7 @@ class Monomial:
         power = self.powers[state]
         if power == 0:
             return None
-        powers = self.powers[:state] + (power - 1,) + self.powers[state + 1 :]
+        powers = (*self.powers[:state], power - 1, *self.powers[state + 1 :])
         return dataclasses.replace(self, coefficient=power * self.coefficient, powers=powers)
 
     def expression(self, states: Sequence[sp.Symbol]) -> sp.Expr:

@@ -1,6 +1,6 @@
 """From a slow flow back to the original oscillator in time, and what that leaves in the original equations.
 
-q(t) = Q(z, t, p),    residual r(t) = d/dt Q_dot - f(t, Q, Q_dot, p)  with  z constant (an equilibrium of the slow flow).
+q(t) = Q(z, t, p),    residual r(t) = Q'' - f(t, Q, Q', p)  with  z constant (an equilibrium of the slow flow).
 """
 
 from __future__ import annotations

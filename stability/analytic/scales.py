@@ -196,6 +196,6 @@ class _Expansion:
 def _no_expansion(node: sp.Basic) -> EquationError:
     return EquationError(
         f"the term {node} cannot be averaged: it is neither a polynomial nor a real power |x|^n of a state, nor a "
-        "smooth function of small ones; give its states scaling orders (small=dict(x=1, ...)) if they are small, or use "
-        "HarmonicBalance(system)"
+        "smooth function of small ones; if its states are small, give them scaling orders (small=dict(x=1, ...)); else "
+        "use HarmonicBalance(system)"
     )

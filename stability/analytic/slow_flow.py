@@ -1,6 +1,6 @@
 r"""`averaging` and `multiple_scales`: from an oscillator to its slow flow, which is a `System` again.
 
-    q_i'' + omega_i^2 q_i = eps g_i(q, q', t)   ->   slow states (u_i, v_i),   q_i = u_i cos(K_i nu t) + v_i sin(K_i nu t) + ...
+    q_i'' + omega_i^2 q_i = eps g_i(q, q', t)   ->   u_i', v_i',      q_i = u_i cos(K_i nu t) + v_i sin(K_i nu t) + ...
 
 The equilibria of the slow flow are the periodic responses, its Hopf points the torus bifurcations (Neimark-Sacker), and
 its eigenvalues the Floquet exponents of the responses, all to the order of the method. How the terms are sorted is in
@@ -134,10 +134,10 @@ def multiple_scales(
 
     Examples
     --------
-    >>> import stability as st
-    >>> free = st.models.van_der_pol()
-    >>> st.multiple_scales(free, order=2).outputs["frequency"].coeff("mu", 0)
-    1
+    >>> import sympy as sp, stability as st
+    >>> slow = st.multiple_scales(st.models.van_der_pol(), order=2)
+    >>> slow.outputs["frequency"].subs(sp.Symbol("x_amplitude", real=True), 2)
+    1 - mu**2/16
     """
     return _slow_flow(system, expanded, "multiple scales", order, resonance, variables, small)
 
@@ -184,8 +184,8 @@ def _slow_flow(
 def _check_free(system: System, resonance: Resonance) -> None:
     if len(system.coordinates) > 1:
         raise InputError(
-            f"'{system.name}' is autonomous with {len(system.coordinates)} degrees of freedom: averaging takes autonomous "
-            "oscillators of one degree of freedom, or forced ones of any; use HarmonicBalance(system)"
+            f"'{system.name}' is autonomous with {len(system.coordinates)} degrees of freedom: averaging takes "
+            "autonomous oscillators of one degree of freedom, or forced ones of any; use HarmonicBalance(system)"
         )
     if resonance is not None and (isinstance(resonance, Mapping) or tuple(resonance) != (1, 1)):
         raise InputError(

@@ -19,7 +19,7 @@ from sympy.polys.rings import ring
 from ..systems.equations import TIME, symbol
 from ..systems.system import System
 from .amplitude_equations import AmplitudeEquations
-from .fourier_terms import Terms, convolved
+from .fourier_terms import Terms
 
 __all__ = ["slow_system"]
 
@@ -123,7 +123,7 @@ def slow_system(equations: AmplitudeEquations, polar: bool, method: str, order: 
         angles=tuple(s for s in states if s.endswith("_phase")),
         orders={k: o for k, o in system.orders.items() if k in system.parameters},
         reconstruction=_reconstruction(equations, variables, alone and polar, outputs),
-        description=f"slow flow of '{system.name}' by {method}, order {order}; amplitudes are those of the fundamental harmonic",
+        description=f"slow flow of '{system.name}' by {method}, order {order}; amplitudes of the fundamental harmonic",
     )
 
 
@@ -132,11 +132,11 @@ def _reconstruction(
 ) -> dict[str, sp.Expr]:
     """Coordinates and velocities in slow states, parameters and t."""
     form = equations.amplitudes.form
-    system, n = form.system, equations.amplitudes.n
+    system = form.system
     phase = TIME * (outputs["frequency"] / form.multiples[0] if free else form.base_frequency)
     positions, velocities = {}, {}
     for i, c in enumerate(system.coordinates):
-        K, W = form.multiples[i], equations.amplitudes.W[i]
+        K = form.multiples[i]
         series: dict[int, Terms] = {k: dict(row) for k, row in equations.corrections[i].items()}
         for k, element in equations.amplitudes.state(i).items():
             row = series.setdefault(k, {})

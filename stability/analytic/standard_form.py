@@ -103,7 +103,7 @@ def check_oscillators(system: System) -> None:
 def graded_rows(
     system: System, orders: Mapping[sp.Symbol, int], number: int
 ) -> tuple[list[dict[Fraction, list[Monomial]]], Fraction]:
-    """For each coordinate: order -> monomials of its acceleration, relative to the order of the coordinate; the step."""
+    """For each coordinate: order -> monomials of its acceleration, relative to that of the coordinate; the step."""
     check_oscillators(system)
     assert system.rhs is not None
     rows = dict(zip(system.states, system.rhs))
@@ -126,7 +126,7 @@ def graded_rows(
 
 
 def root(system: System, stiffness: sp.Expr) -> sp.Expr:
-    """The natural frequency sqrt(stiffness); parameters with a positive default are taken as positive, sqrt(q^2) = q."""
+    """The natural frequency sqrt(stiffness); parameters with a positive default count as positive, sqrt(q^2) = q."""
     positive = {symbol(name): sp.Dummy(name, positive=True) for name, value in system.parameters.items() if value > 0}
     value = sp.sqrt(stiffness.xreplace(positive))
     return value.xreplace({dummy: s for s, dummy in positive.items()})
@@ -197,8 +197,8 @@ def _linear_part(
                 )
             free = ", ".join(sorted(s.name for s in term.coefficient.free_symbols)) or "none"
             raise EquationError(
-                f"the term {shown} in the equation of '{name}' is of order {o}, but only a linear spring and forcing may "
-                f"be: give one of its parameters ({free}) or states a positive scaling order (small=), or use "
+                f"the term {shown} in the equation of '{name}' is of order {o}, but only a linear spring and forcing "
+                f"may be: give one of its parameters ({free}) or states a positive scaling order (small=), or use "
                 "HarmonicBalance(system)"
             )
     values = {symbol(k): v for k, v in system.parameters.items()}
@@ -266,8 +266,9 @@ def _linear_response(
             name = system.coordinates[i]
             amplitude = sp.simplify(2 * value)
             raise EquationError(
-                f"the forcing of '{name}' at its response frequency, amplitude {amplitude}, is of order 0: in resonance it "
-                f"must be small. Give a parameter of it the order 1, or say that the response is large: small=dict(..., {name}=-1)"
+                f"the forcing of '{name}' at its response frequency, amplitude {amplitude}, is of order 0: in "
+                f"resonance it must be small. Give a parameter of it the order 1, or say that the response is large: "
+                f"small=dict(..., {name}=-1)"
             )
         factor = (1 if m == 0 else 2) / (stiffness - (harmonic * base) ** 2)
         found[harmonic] = (sp.re(value) * factor, -sp.im(value) * factor)
