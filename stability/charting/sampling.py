@@ -64,6 +64,21 @@ class Sampler:
         return "matrix"
 
     @cached_property
+    def balance(self) -> Array:
+        """Units of the states, (n,), in which rows and columns of A are of like size (SI velocities are not)."""
+        x0, x1, y0, y1 = self.window
+        P = self.parameters(np.array([0.5 * (x0 + x1)]), np.array([0.5 * (y0 + y1)]))
+        size = np.abs(self.linear.A(_TRIED, P)).max(axis=(0, 1))
+        np.fill_diagonal(size, 0.0)
+        d = np.ones(len(size))
+        for _ in range(20):
+            for i in range(len(d)):
+                row, column = float((size[i] * d).sum()) / d[i], float((size[:, i] / d).sum()) * d[i]
+                if row > 0 and column > 0:
+                    d[i] *= np.sqrt(row / column)
+        return np.asarray(d / d[0])
+
+    @cached_property
     def is_reciprocal(self) -> bool:
         """Whether the polynomial of M0 is its own reciprocal at random points of the window."""
         random = np.random.default_rng(3)
@@ -124,9 +139,10 @@ class Sampler:
         return entries if self.form == "matrix" else np.concatenate([characteristic_coefficients(M), entries])
 
     def _normalised(self, x: Array, y: Array, steps: int) -> Array:
-        """M0 = M exp(-sigma T), (N, n, n)."""
+        """M0 = M exp(-sigma T), (N, n, n), in balanced units of the states."""
         clock = self.clock(x, y)
-        return self.matrix(x, y, steps) * np.exp(-clock[1] / clock[0])[:, None, None]
+        d = self.balance
+        return self.matrix(x, y, steps) * (np.exp(-clock[1] / clock[0])[:, None, None] * (d / d[:, None]))
 
     def _stiffness(self, x: Array, y: Array, P: Array, shared: bool) -> tuple[Callable[[Array], Array], Array]:
         """k as a function of the phases, (K, N), and c^2/4 (N,), for q'' + c q' + k q = 0.

@@ -16,6 +16,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import ConvergenceError
 from ..kernels.chebyshev import chop, coefficients, lobatto, tails
 from ..results.tiles import Tile
 from .sampling import Sampler
@@ -25,7 +26,7 @@ __all__ = ["build_tiles"]
 Array = NDArray[np.float64]
 
 _FIRST, _LARGEST = 16, 64
-_MAX_TILES = 400
+_MAX_TILES = 200
 _MAX_SPLIT_FOR_ERROR = 64  # beyond, a tile that converged is kept with the error it has
 _MAX_STEPS = 8192
 
@@ -53,10 +54,16 @@ def build_tiles(
             if error > tolerance and few and error < 0.5 * inherited:
                 kx, ky = tile.fields.shape[2], tile.fields.shape[1]
                 direction, inherited = ("x" if kx >= ky else "y"), error
-        if direction is None or full:
-            assert tile is not None
+        if direction is None and tile is not None:
             done.append(tile)
             continue
+        if full or direction is None:
+            x0, x1, y0, y1 = current
+            raise ConvergenceError(
+                f"the Floquet data do not converge on {x0:g} to {x1:g}, {y0:g} to {y1:g} after {len(done)} tiles: a "
+                "singular point or very large growth lies there; make the window smaller, or raise tolerance",
+                box=current, tiles=len(done),
+            )  # fmt: skip
         for part in _halves(current, direction):
             waiting.append((part, inherited))
     return tuple(sorted(done, key=lambda tile: (tile.box[2], tile.box[0])))
