@@ -109,123 +109,139 @@ def _phase_row(W, h, weights, nodes, Y, row):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _norm(weights, weight_T, dY, dT):  # type: ignore[no-untyped-def]
-    total = weight_T * dT * dT
-    for j in range(dY.shape[0]):
-        for k in range(dY.shape[1]):
-            total += weights[j, k] * dY[j, k] * dY[j, k]
+def _norm(weights, x):  # type: ignore[no-untyped-def]
+    """sqrt(sum w x^2); x may have a parameter's entry more than w."""
+    total = 0.0
+    for k in range(weights.shape[0]):
+        total += weights[k] * x[k] * x[k]
     return np.sqrt(total)
+
+
+@kernel(inline=True)
+def _borders(own, arc, W, h, stage_weights, weight_T, nodes, Y, t_Y, t_T, pull, rows, node_rows, corner):  # type: ignore[no-untyped-def]
+    """Rows of the phase condition and of the arclength, with their entries at the unknown period and parameter."""
+    for r in range(rows.shape[0]):
+        for j in range(nodes.shape[0]):
+            for a in range(nodes.shape[1]):
+                node_rows[r, j, a] = 0.0
+        for k in range(corner.shape[1]):
+            corner[r, k] = 0.0
+    if own == 1:
+        _phase_row(W, h, stage_weights, nodes, Y, rows[0])
+    if arc == 1:
+        for j in range(Y.shape[0]):
+            for k in range(Y.shape[1]):
+                rows[own, j, k] = stage_weights[j, k] * t_Y[j, k]
+        if own == 1:
+            corner[own, 0] = weight_T * t_T
+        corner[own, own] = pull
+
+
+@kernel(inline=True)
+def _columns(own, arc, free, h, sigma, span, F, Fp, dT, stage, node, columns, node_columns):  # type: ignore[no-untyped-def]
+    """Right sides of the linear system: period, parameter, -residual; without an arc the parameter is a right side."""
+    at_free, at_rhs = (own, own + 1) if arc == 1 else (own + 1, own)
+    if own == 1:
+        _parameter_column(h, sigma, span, dT, F, Fp, -1, columns, 0)
+    _parameter_column(h, sigma, span, dT, F, Fp, free, columns, at_free)
+    for j in range(stage.shape[0]):
+        for k in range(stage.shape[1]):
+            columns[j, k, at_rhs] = -stage[j, k]
+            if arc == 0:
+                columns[j, k, at_free] = -columns[j, k, at_free]
+    for j in range(node.shape[0]):
+        for a in range(node.shape[1]):
+            for k in range(own + 2):
+                node_columns[j, a, k] = 0.0
+            node_columns[j, a, at_rhs] = -node[j, a]
+    return at_rhs
 
 
 @kernel
 def newton(  # type: ignore[no-untyped-def]
-           field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales, weights, weight_T,
-           P, free, nodes, Y, T, arc, t_nodes, t_Y, t_T, t_l, weight_l, ds, tolerance, max_iterations,
-           F, J, Fp, dT, LU, pivots, Z, M):  # fmt: skip
-    """Correct (nodes, Y, T, P[free]) in place; `arc` = 1 with a tangent, 0 without (then P stays fixed).
+    field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales, weights, stage_weights,
+    P, free, u, nodes, Y, T, arc, t, t_Y, t_l, weight_l, ds, tolerance, max_iterations,
+    F, J, Fp, dT, LU, pivots, Z, M,
+):  # fmt: skip
+    """Correct u = (nodes, Y, period) and P[free] in place; `arc` = 1 with a tangent (t, t_l), 0 without (P stays).
 
-    Returns (status, iterations, residual, sign, du, dY, dl, tangent of T, tangent of P[free]): du, dY, dl hold the last
-    correction [0] and the tangent of the curve [1], not normalised; without `arc` the derivative by P[free].
-    F, J, Fp, dT, LU, pivots, Z, M hold the last linearisation.
+    nodes and Y are views of u, t_Y of t, stage_weights of weights. Returns (status, iterations, residual, sign, x):
+    x[0] is the last correction, x[1] the tangent of the curve, not normalised (without `arc` the derivative by
+    P[free]), both as (u, parameter). F, J, Fp, dT, LU, pivots, Z, M hold the last linearisation.
     """
-    intervals, size = Y.shape
-    n = nodes.shape[1]
+    intervals, size, n, count = Y.shape[0], Y.shape[1], nodes.shape[1], u.shape[0]
     own = 1 if period == 0 else 0
-    q = own + arc
-    extra = own + 2
-    given, given_T, given_l = np.empty((intervals, size)), T[0], P[free]
+    last = count - 1
+    pull = weight_l * weight_l * t_l
+    rows, node_rows = np.empty((own + arc, intervals, size)), np.empty((own + arc, intervals + 1, n))
+    corner, stage, node = np.empty((own + arc, own + 2)), np.empty((intervals, size)), np.empty((intervals + 1, n))
+    columns, node_columns = np.empty((intervals, size, own + 2)), np.empty((intervals + 1, n, own + 2))
+    _borders(own, arc, W, h, stage_weights, weights[last], nodes, Y, t_Y, t[last], pull, rows, node_rows, corner)
+    moved = np.empty((intervals, size))  # from the given stages
+    moved_T, moved_l = ds * t[last] * arc, ds * t_l * arc
     for j in range(intervals):
         for k in range(size):
-            given[j, k] = Y[j, k]
-    rows, node_rows = np.zeros((q, intervals, size)), np.zeros((q, intervals + 1, n))
-    corner = np.zeros((q, extra))
-    if own == 1:
-        _phase_row(W, h, weights, nodes, Y, rows[0])
-    if arc == 1:
-        for j in range(intervals):
-            for k in range(size):
-                rows[own, j, k] = weights[j, k] * t_Y[j, k]
-                Y[j, k] += ds * t_Y[j, k]
-        for j in range(intervals + 1):
-            for a in range(n):
-                nodes[j, a] += ds * t_nodes[j, a]
-        T[0] += ds * t_T
-        P[free] += ds * t_l
-        if own == 1:
-            corner[own, 0] = weight_T * t_T
-        corner[own, own] = weight_l * weight_l * t_l
-    stage, node = np.empty((intervals, size)), np.empty((intervals + 1, n))
-    columns, node_columns = np.empty((intervals, size, extra)), np.zeros((intervals + 1, n, extra))
-    at_free, at_rhs = (own, own + 1) if arc == 1 else (own + 1, own)
-    status, sign, residual, previous = NO_CONVERGENCE, 0.0, np.inf, np.inf
-    iterations = 0
-    du, dY, dl = np.zeros((2, intervals + 1, n)), np.zeros((2, intervals, size)), np.zeros((2, q))
+            moved[j, k] = ds * t_Y[j, k] * arc
+    for k in range(count):
+        u[k] += ds * t[k] * arc
+    P[free] += moved_l
+    x = np.empty((2, count + arc))
+    status, sign, residual, previous, iterations = NO_CONVERGENCE, 0.0, np.inf, np.inf, 0
     while iterations < max_iterations:
         iterations += 1
+        if own == 1:
+            T[0] = u[last]
         sigma = _evaluate(field, period, span, phase, P, Y, T, F, J, Fp, dT)
         residual = _residual(W, update, h, sigma, S, jump, nodes, Y, F, scales, stage, node)
         if not residual < np.inf:
             status = NOT_FINITE
             break
-        if own == 1:
-            _parameter_column(h, sigma, span, dT, F, Fp, -1, columns, 0)
-        _parameter_column(h, sigma, span, dT, F, Fp, free, columns, at_free)
-        flip = 1.0 if arc == 1 else -1.0
-        for j in range(intervals):
-            for k in range(size):
-                columns[j, k, at_rhs] = -stage[j, k]
-                columns[j, k, at_free] *= flip
-        for j in range(intervals + 1):
-            for a in range(n):
-                node_columns[j, a, at_rhs] = -node[j, a]
-        for r in range(q):
+        at_rhs = _columns(own, arc, free, h, sigma, span, F, Fp, dT, stage, node, columns, node_columns)
+        for r in range(own + arc):
             value = 0.0
             for j in range(intervals):
                 for k in range(size):
-                    value += rows[r, j, k] * (Y[j, k] - given[j, k])
+                    value += rows[r, j, k] * moved[j, k]
             if r == own:
-                value += weight_T * t_T * (T[0] - given_T) * own + weight_l * weight_l * t_l * (P[free] - given_l) - ds
+                value += weights[last] * t[last] * moved_T * own + pull * moved_l - ds
             corner[r, at_rhs] = -value
         sign = condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, pivots, Z, M)
+        if sign != 0.0:
+            sign *= reduce_and_solve(update, Z, M, columns, node_columns, rows, node_rows, corner, S, arc, x)
         if sign == 0.0:
             status = SINGULAR
             break
-        du, dY, dl, one = reduce_and_solve(update, Z, M, columns, node_columns, rows, node_rows, corner, S, arc)
-        sign *= one
-        if sign == 0.0:
-            status = SINGULAR
-            break
-        change_T = dl[0, 0] if own == 1 else 0.0
-        change_l = dl[0, own] if arc == 1 else 0.0
-        change = np.sqrt(_norm(weights, weight_T, dY[0], change_T) ** 2 + (weight_l * change_l) ** 2)
+        change_l = x[0, count] if arc == 1 else 0.0
+        change, length = np.sqrt(_norm(weights, x[0]) ** 2 + (weight_l * change_l) ** 2), _norm(weights, u)
         if not change < np.inf:
             status = NOT_FINITE
             break
-        size_u = _norm(weights, weight_T, Y, T[0])
         damping = 1.0
-        if arc == 0 and change > 0.5 * (1.0 + size_u):
-            damping = 0.5 * (1.0 + size_u) / change
-        if own == 1 and change_T < -0.5 * T[0]:
-            damping = min(damping, -0.5 * T[0] / change_T)
-        for j in range(intervals):
-            for k in range(size):
-                Y[j, k] += damping * dY[0, j, k]
-        for j in range(intervals + 1):
-            for a in range(n):
-                nodes[j, a] += damping * du[0, j, a]
-        if own == 1:
-            T[0] += damping * change_T
-        if arc == 1:
-            P[free] += damping * change_l
-        if change <= tolerance * (1.0 + size_u):
+        if arc == 0 and change > 0.5 * (1.0 + length):
+            damping = 0.5 * (1.0 + length) / change
+        if own == 1 and x[0, last] < -0.5 * u[last]:
+            damping = min(damping, -0.5 * u[last] / x[0, last])
+        for k in range(count):
+            u[k] += damping * x[0, k]
+        _shift(moved, x, damping, (intervals + 1) * n)
+        moved_T, moved_l = moved_T + damping * x[0, last], moved_l + damping * change_l
+        P[free] += damping * change_l
+        if change <= tolerance * (1.0 + length):
             status = CONVERGED
             break
         if arc == 1 and iterations > 1 and change > 2.0 * previous:
             break
         previous = change
-    t_period = dl[1, 0] if own == 1 else 0.0
-    t_parameter = dl[1, own] if arc == 1 else 1.0
-    return status, iterations, residual, sign, du, dY, dl, t_period, t_parameter
+    return status, iterations, residual, sign, x
+
+
+@kernel(inline=True)
+def _shift(moved, x, damping, first):  # type: ignore[no-untyped-def]
+    """moved += damping * (stages of x[0], which begin at `first`)."""
+    size = moved.shape[1]
+    for j in range(moved.shape[0]):
+        for k in range(size):
+            moved[j, k] += damping * x[0, first + j * size + k]
 
 
 @kernel

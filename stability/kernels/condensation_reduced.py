@@ -206,13 +206,13 @@ def _dense(T, borders, reduced, S, end, tangent):  # type: ignore[no-untyped-def
 
 
 @kernel
-def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent):  # type: ignore[no-untyped-def]
+def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent, out):  # type: ignore[no-untyped-def]
     """Solve the bordered system for every right-hand side.
 
     Parameters: X (N, mn, K) = G^-1 C and nodes (N+1, n, K), the columns of the node equations (last: the boundary
     condition); the first q of the K columns belong to unknown parameters. rows (q, N, mn), node_rows (q, N+1, n),
     corner (q, K). `tangent` = 1 adds one right side: zero but for a 1 in the last border row.
-    Returns node corrections (sides, N+1, n), stage corrections (sides, N, mn), parameters (sides, q), sign or 0.
+    out (sides, (N + 1) n + N mn + q) receives nodes, stages and parameters of each. Returns the sign (0: singular).
     """
     intervals, size, extra = X.shape
     n = Z.shape[2]
@@ -223,21 +223,18 @@ def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent
     count = _group(M, Q, borders, reduced, ends, E, g)
     R = np.empty((max(count - 1, 1), n, 3 * n + extra))
     T, sign = _chain(E, g, count, ends, borders, reduced, R)
-    du = np.empty((sides, intervals + 1, n))
-    dY = np.empty((sides, intervals, size))
-    dl = np.empty((sides, q))
     if sign == 0.0:
-        return du, dY, dl, 0.0
+        return 0.0
     D, one = _dense(T, borders, reduced, S, nodes[intervals], tangent)
     if one == 0.0:
-        return du, dY, dl, 0.0
-    z = np.empty(extra)
+        return 0.0
+    z, du, first = np.empty(extra), np.empty((sides, intervals + 1, n)), (intervals + 1) * n
     for side in range(sides):
         column = n + q + side
         for k in range(extra):
             z[k] = 0.0
         for k in range(q):
-            dl[side, k] = D[n + k, column]
+            out[side, first + intervals * size + k] = D[n + k, column]
             z[k] = -D[n + k, column]
         if q + side < extra:
             z[q + side] = 1.0
@@ -277,8 +274,11 @@ def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent
                     value += Z[j, row, b] * du[side, j, b]
                 for k in range(extra):
                     value += X[j, row, k] * z[k]
-                dY[side, j, row] = value
-    return du, dY, dl, sign * one
+                out[side, first + j * size + row] = value
+        for j in range(intervals + 1):
+            for a in range(n):
+                out[side, j * n + a] = du[side, j, a]
+    return sign * one
 
 
 @kernel

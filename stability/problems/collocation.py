@@ -191,9 +191,11 @@ class Collocation(OrbitDiscretisation):
         return self.mesh.quadrature(self.scales)
 
     @cached_property
-    def _raised_quadrature(self) -> Array:
-        """The same on the mesh of degree m + 1."""
-        return self.mesh.raised[0].quadrature(self.scales)
+    def _raised_weights(self) -> Array:
+        """`weights` on the mesh of degree m + 1."""
+        higher = self.mesh.raised[0]
+        nodes = np.zeros((higher.intervals + 1, higher.n))
+        return higher.join(nodes, higher.quadrature(self.scales), self.period_scale**-2)
 
     @cached_property
     def weights(self) -> Array:
@@ -241,40 +243,33 @@ class Collocation(OrbitDiscretisation):
         tolerance: float, limit: int | None,
     ) -> Corrected:  # fmt: skip
         u, params = np.array(u, float), np.array(params, float)
-        nodes, stages, rest = mesh.split(u)
+        nodes, stages, _ = mesh.split(u)
         work = Workspace(mesh, len(params), len(self.kept))
-        work.T[:] = rest if mesh.own else 0.0
-        arc = 0 if tangent is None else 1
-        t_nodes, t_stages, t_rest = mesh.split(u if tangent is None else tangent.u)
-        t_T = float(t_rest[0]) if mesh.own and arc else 0.0
-        t_l, weight = (0.0, 0.0) if tangent is None else (float(tangent.parameter), float(tangent.weight))
-        weights = self.quadrature if mesh is self.mesh else self._raised_quadrature
-        rule, weight_T = mesh.rule, self.period_scale**-2 * mesh.own
-        status, iterations, residual, sign, du, dY, dl, t_period, t_parameter = kernels.newton(
+        arc, t, t_l, weight = 0, u, 0.0, 0.0
+        if tangent is not None:
+            arc, t, t_l, weight = 1, tangent.u, float(tangent.parameter), float(tangent.weight)
+        weights = self.weights if mesh is self.mesh else self._raised_weights
+        rule = mesh.rule
+        status, iterations, residual, sign, x = kernels.newton(
             self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.matrix,
             rule.row_sums, rule.update, self.kept, self.position, self.closure, self.winding, self.scales, weights,
-            weight_T, params, index, nodes, stages, work.T, arc, t_nodes, t_stages, t_T, t_l, weight, float(ds),
-            float(tolerance), limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU, work.pivots,
-            work.Z, work.M,
+            mesh.split(weights)[1], params, index, u, nodes, stages, work.T, arc, t, mesh.split(t)[1], t_l, weight,
+            float(ds), float(tolerance), limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU,
+            work.pivots, work.Z, work.M,
         )  # fmt: skip
-        rest[:] = work.T[: mesh.own]
         if status != kernels.CONVERGED:
             note = _NOTES.get(status) or self._not_finite(mesh, work)
             return Corrected(u, params, None, float(residual), iterations, 0, None, False, note)
-        change_T = float(dl[0, 0]) if mesh.own else 0.0
-        change_l = float(dl[0, mesh.own]) if arc else 0.0
-        work.T[0] -= change_T
-        direction = mesh.join(du[1], dY[1], t_period)
+        direction = x[1, : mesh.size]
         if tangent is None:
             new = Tangent(direction, 1.0, 1.0)
         else:
-            square = float(np.dot((weights * dY[1]).ravel(), dY[1].ravel()))
-            size = math.sqrt(square + weight_T * t_period**2 + (weight * t_parameter) ** 2)
-            direction /= size
-            new = Tangent(direction, float(t_parameter / size), weight)
+            size = math.sqrt(float(np.dot(weights * direction, direction)) + (weight * float(x[1, -1])) ** 2)
+            direction = direction / size
+            new = Tangent(direction, float(x[1, -1]) / size, weight)
         linearisation: Any = work
         if mesh is self.mesh:
-            correction = (du[0], dY[0], change_T, change_l, index)
+            correction = (x[0, : mesh.size], float(x[0, -1]) if arc else 0.0, index)
             linearisation = CollocationLinearisation(self, u, params, work, sign, correction)
             if arc:
                 self._memo["tangent"] = (u, index, new)
@@ -349,7 +344,7 @@ class Collocation(OrbitDiscretisation):
         return result
 
     def error(self, u: Array, params: Array) -> float:
-        """Largest error of the nodes over the scales of the states (and of the period), by degree m + 1; inf: unknown."""
+        """Largest error of the nodes and of the period over their scales, by degree m + 1; inf: unknown."""
         refined = self.refined(u, params)
         if refined is None:
             return np.inf
@@ -372,7 +367,9 @@ class Collocation(OrbitDiscretisation):
         values = contracted(values, linearisation.work.M) if not self.halved else values
         return orbit_spectrum(values, error, self._area_preserving(linearisation))
 
-    def _multiplier_error(self, linearisation: CollocationLinearisation, values: Array, direction: Array | None) -> float:
+    def _multiplier_error(
+        self, linearisation: CollocationLinearisation, values: Array, direction: Array | None
+    ) -> float:
         """Change of the multipliers near the unit circle from degree m to m + 1.
 
         Where no multiplier is near the circle, the change at an earlier point of the same mesh is carried over, times

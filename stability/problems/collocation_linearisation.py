@@ -52,8 +52,8 @@ class Workspace:
 class CollocationLinearisation:
     """F, F_u and spectral data at (u, p); see `protocols.Linearisation`. `sign` = 0: a singular interval.
 
-    A Newton solve leaves the linearisation of its last iterate: `correction` = (nodes, stages, period, parameter, its
-    index) leads from there to the solution `solution`, `solution_params`.
+    A Newton solve leaves the linearisation of its last iterate: `correction` = (change of u, change of the parameter,
+    its index) leads from there to the solution `solution`, `solution_params`.
     """
 
     problem: Collocation
@@ -61,23 +61,22 @@ class CollocationLinearisation:
     solution_params: Array
     work: Workspace
     sign: float
-    correction: tuple[Array, Array, float, float, int] | None = None
+    correction: tuple[Array, float, int] | None = None
 
     @cached_property
     def u(self) -> Array:
         """(N,) where the linearisation is taken."""
         if self.correction is None:
             return self.solution
-        nodes, stages, period, _, _ = self.correction
-        return np.asarray(self.solution - self.mesh.join(nodes, stages, period))
+        return np.asarray(self.solution - self.correction[0])
 
     @cached_property
     def params(self) -> Array:
         """(m,) where the linearisation is taken."""
         params = self.solution_params
-        if self.correction is not None and self.correction[3] != 0.0:
+        if self.correction is not None and self.correction[1] != 0.0:
             params = params.copy()
-            params[self.correction[4]] -= self.correction[3]
+            params[self.correction[2]] -= self.correction[1]
         return params
 
     # ------------------------------------------------------------------ shorthands
@@ -172,13 +171,12 @@ class CollocationLinearisation:
         if self.sign == 0.0 or not np.isfinite(body).all():
             return out
         solve_stages(*self._factors(), X)
-        du, dY, dl, sign = reduce_and_solve(
-            mesh.rule.update, self.work.Z, self.work.M, X, nodes, all_rows, node_rows, corners, problem.closure, 0
+        x = np.empty((sides, mesh.size + q))
+        sign = reduce_and_solve(
+            mesh.rule.update, self.work.Z, self.work.M, X, nodes, all_rows, node_rows, corners, problem.closure, 0, x
         )
         if sign != 0.0:
-            for k in range(sides):
-                out[: mesh.size, k] = mesh.join(du[k], dY[k], dl[k, :own])
-                out[mesh.size :, k] = dl[k, own:]
+            out[:] = x.T
         return out
 
     # ------------------------------------------------------------------ spectral matrix and core
