@@ -241,7 +241,7 @@ def _end_at_birth(follower: Follower, birth: Point) -> None:
     """A loop that came back to its branch point ends there, and the point is listed once."""
     for k in range(len(follower.entries) - 1, 0, -1):
         point, found = follower.entries[k]
-        again = found is not None and found.kind is Kind.BRANCH_POINT
+        again = found is not None and found.kind in (Kind.BRANCH_POINT, Kind.FOLD)
         if again and abs(point.parameter - birth.parameter) * birth.tangent.weight < 1e-7:
             follower.entries[k:] = [Entry(point, None)]
             return

@@ -25,6 +25,10 @@ from .points import Point
 __all__ = ["Changes", "Dip", "changes", "crossed", "dip_of", "double_turn", "supported"]
 
 
+_LOST = 0.1  # an error of multipliers (eigenvalues: relative to the largest) beyond which counts mean nothing
+_STILL = 1e-8  # a scaled rate of the parameter that is rounding
+
+
 class Changes(NamedTuple):
     """What the integers say happened between two points."""
 
@@ -89,7 +93,7 @@ def changes(a: Point, b: Point) -> Changes:
     """Compare neighbours; a zero tangent component or determinant (a point exactly at an event) is no change."""
     x, y = a.spectrum, b.spectrum
     return Changes(
-        a.tangent.parameter * b.tangent.parameter < 0,
+        turns(a, b),
         a.determinant_sign * b.determinant_sign < 0,
         y.beyond_plus - x.beyond_plus,
         y.beyond_minus - x.beyond_minus,
@@ -100,15 +104,28 @@ def changes(a: Point, b: Point) -> Changes:
 
 
 def supported(a: Point, b: Point) -> bool:
-    """False where the change of counts is within the error of the values at both ends (noise on the limit)."""
-    ends = []
+    """False where counts and determinants are noise: values known worse than their distance to the limit.
+
+    Near a homoclinic orbit multipliers reach 1e15, and neither the others nor the determinant's sign mean anything.
+    """
+    near = False
     for p in (a, b):
         values = p.spectrum.values
         if not values.size:
             return True
-        gap = abs(abs(values) - 1.0) if p.problem.critical.circle else abs(values.real)
-        ends.append(float(gap.min()) > p.spectrum.error)
-    return any(ends)
+        circle = p.problem.critical.circle
+        if p.spectrum.error > _LOST * (1.0 if circle else float(np.abs(values).max())):
+            return False
+        gap = np.abs(np.abs(values) - 1.0) if circle else np.abs(values.real)
+        near = near or float(gap.min()) > p.spectrum.error
+    return near
+
+
+def turns(a: Point, b: Point) -> bool:
+    """Whether the parameter's rate changes sign by more than its rounding error."""
+    weight = a.tangent.weight
+    r0, r1 = a.tangent.parameter * weight, b.tangent.parameter * weight
+    return r0 * r1 < 0 and max(abs(r0), abs(r1)) > _STILL
 
 
 def double_turn(a: Point, b: Point) -> float | None:
@@ -117,7 +134,7 @@ def double_turn(a: Point, b: Point) -> float | None:
     With chord h and rates r0, r1 the cubic's rate is r0 (1-x)(1-3x) + 6 x (1-x) D + r1 x (3x-2), D = (l1 - l0)/h.
     """
     r0, r1, h = a.tangent.parameter, b.tangent.parameter, b.step
-    if r0 * r1 <= 0 or h <= 0:
+    if r0 * r1 <= 0 or h <= 0 or abs(r0) * a.tangent.weight < _STILL:
         return None
     mean = (b.parameter - a.parameter) / h
     curvature = 3 * (r0 + r1) - 6 * mean

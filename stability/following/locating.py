@@ -138,8 +138,10 @@ class Locator:
     def resolve(self, a: Point, b: Point, level: int = 0) -> list[Found]:
         """All events between a and b, in order along the branch."""
         change = changes(a, b)
-        if not (change.fold or change.branch or supported(a, b)):
-            return []
+        if not supported(a, b):
+            if not change.fold:
+                return []
+            change = Changes(True, False, 0, 0, 0, 0, False)  # of the signs only that of the parameter's rate counts
         fine = level >= _AMBIGUOUS
         if change.nothing and (fine or not change.collision):
             return []

@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..words import Kind
-from .events import crossed, dip_of, double_turn
+from .events import crossed, dip_of, double_turn, supported
 from .locating import Found, Locator
 from .points import Point
 
@@ -29,7 +29,7 @@ def between(locator: Locator, before: Point | None, a: Point, b: Point) -> tuple
     behind: list[Point] = [before, a] if before is not None and before.problem is a.problem else []
     x = double_turn(a, b)
     cuts = [] if x is None else [(x, 3, 0.0)]
-    if before is not None:
+    if before is not None and supported(a, b):
         for which in _tests(b):
             dip = dip_of((before, a, b), which)
             if dip is not None and dip.depth < _DIP:
