@@ -79,6 +79,42 @@ def _error(K, h, z, new, rtol, atol, n):  # type: ignore[no-untyped-def]
     return worst
 
 
+@kernel(inline=True)
+def _first_step(z, slope, rtol, atol, span):  # type: ignore[no-untyped-def]
+    """A careful first step: a hundredth of |x| / |x'| in units of the tolerance."""
+    d0, d1 = 0.0, 0.0
+    for a in range(z.shape[0]):
+        scale = atol[a] + rtol * abs(z[a, 0])
+        d0, d1 = d0 + (z[a, 0] / scale) ** 2, d1 + (slope[a, 0] / scale) ** 2
+    h = 0.01 * np.sqrt(d0 / d1) if d0 > 1e-10 and d1 > 1e-10 else 1e-3 * span
+    return min(h, 0.1 * span)
+
+
+@kernel(inline=True)
+def _stage(weights, count, h, z, K, out):  # type: ignore[no-untyped-def]
+    """out = z + h sum_i weights_i K_i."""
+    for a in range(z.shape[0]):
+        for k in range(z.shape[1]):
+            value = 0.0
+            for i in range(count):
+                value += weights[i] * K[i, a, k]
+            out[a, k] = z[a, k] + h * value
+
+
+@kernel(inline=True)
+def _doubled(times, coefficients, steps):  # type: ignore[no-untyped-def]
+    """Twice the room for dense output."""
+    room, n = 2 * coefficients.shape[0], coefficients.shape[2]
+    more_t, more_c = np.empty(room + 1), np.empty((room, 8, n))
+    for q in range(steps + 1):
+        more_t[q] = times[q]
+    for q in range(steps):
+        for r in range(8):
+            for a in range(n):
+                more_c[q, r, a] = coefficients[q, r, a]
+    return more_t, more_c
+
+
 @kernel
 def integrate(field, P, sigma, phase0, rate, s, end, z, which, sigma_p, rtol, atol, h, inside, max_steps, dense):  # type: ignore[no-untyped-def]
     """Advance z (n, 1 + k) in place from s to `end` > s.
@@ -89,10 +125,9 @@ def integrate(field, P, sigma, phase0, rate, s, end, z, which, sigma_p, rtol, at
     (steps, 8, n)): on a step x(s + theta h) is built from the eight coefficients by `interpolate`.
     """
     n, columns = z.shape
-    m = P.shape[0]
     K = np.zeros((16, n, columns))
-    F, J, Fp, x, phase = np.empty((1, n)), np.empty((1, n, n)), np.empty((1, n, m)), np.empty((1, n)), np.empty(1)
-    work, new = np.empty((n, columns)), np.empty((n, columns))
+    F, J, Fp = np.empty((1, n)), np.empty((1, n, n)), np.empty((1, n, P.shape[0]))
+    x, phase, work, new = np.empty((1, n)), np.empty(1), np.empty((n, columns)), np.empty((n, columns))
     low, high = s + inside, end - inside
     room = 64 if dense == 1 else 1
     times, coefficients = np.empty(room + 1), np.empty((room, 8, n))
@@ -100,55 +135,35 @@ def integrate(field, P, sigma, phase0, rate, s, end, z, which, sigma_p, rtol, at
     steps, rejected = 0, False
     _slope(field, P, sigma, phase0, rate, low, high, s, z, n, which, sigma_p, F, J, Fp, x, phase, K[0])
     if h <= 0.0:
-        d0, d1 = 0.0, 0.0
-        for a in range(n):
-            scale = atol[a] + rtol * abs(z[a, 0])
-            d0, d1 = d0 + (z[a, 0] / scale) ** 2, d1 + (K[0, a, 0] / scale) ** 2
-        h = 0.01 * np.sqrt(d0 / d1) if d0 > 1e-10 and d1 > 1e-10 else 1e-3 * (end - s)
-        h = min(h, 0.1 * (end - s))
+        h = _first_step(z, K[0], rtol, atol, end - s)
     status = TOO_MANY_STEPS
     for _ in range(max_steps):
         h = min(h, end - s)
         if end - s - h < 1e-3 * h:
             h = end - s
         for i in range(1, 12):
-            for a in range(n):
-                for k in range(columns):
-                    value = 0.0
-                    for j in range(i):
-                        value += _A[i, j] * K[j, a, k]
-                    work[a, k] = z[a, k] + h * value
-            _slope(field, P, sigma, phase0, rate, low, high, s + _C[i] * h, work, n, which, sigma_p, F, J, Fp, x, phase,
-                   K[i])  # fmt: skip
-        for a in range(n):
-            for k in range(columns):
-                value = 0.0
-                for i in range(12):
-                    value += _B[i] * K[i, a, k]
-                new[a, k] = z[a, k] + h * value
+            _stage(_A[i], i, h, z, K, work)
+            at = s + _C[i] * h
+            _slope(field, P, sigma, phase0, rate, low, high, at, work, n, which, sigma_p, F, J, Fp, x, phase, K[i])
+        _stage(_B, 12, h, z, K, new)
         error = _error(K, h, z, new, rtol, atol, n)
         if not error < 1.0:
-            factor = 0.9 * error ** (-0.125) if error < np.inf else 0.1
-            h *= min(1.0, max(0.1, factor))
+            h *= min(1.0, max(0.1, 0.9 * error ** (-0.125) if error < np.inf else 0.1))
             rejected = True
             if not h > 1e-14 * max(abs(s), abs(end)):
                 status = NOT_FINITE if not error < np.inf else STEP_TOO_SMALL
                 break
             continue
-        _slope(field, P, sigma, phase0, rate, low, high, s + h, new, n, which, sigma_p, F, J, Fp, x, phase, K[12])
+        at = s + h
+        _slope(field, P, sigma, phase0, rate, low, high, at, new, n, which, sigma_p, F, J, Fp, x, phase, K[12])
         if dense == 1:
-            if steps == room:
-                room *= 2
-                more_t, more_c = np.empty(room + 1), np.empty((room, 8, n))
-                for q in range(steps + 1):
-                    more_t[q] = times[q]
-                for q in range(steps):
-                    for r in range(8):
-                        for a in range(n):
-                            more_c[q, r, a] = coefficients[q, r, a]
-                times, coefficients = more_t, more_c
-            _keep(field, P, sigma, phase0, rate, low, high, s, h, z, new, n, which, sigma_p, F, J, Fp, x, phase, work,
-                  K, coefficients[steps])  # fmt: skip
+            if steps == coefficients.shape[0]:
+                times, coefficients = _doubled(times, coefficients, steps)
+            for i in range(13, 16):
+                _stage(_A[i], i, h, z, K, work)
+                at = s + _C[i] * h
+                _slope(field, P, sigma, phase0, rate, low, high, at, work, n, which, sigma_p, F, J, Fp, x, phase, K[i])
+            _keep(h, z, new, K, coefficients, steps)
             times[steps + 1] = s + h
         steps += 1
         finished = h == end - s
@@ -157,40 +172,28 @@ def integrate(field, P, sigma, phase0, rate, s, end, z, which, sigma_p, rtol, at
             for k in range(columns):
                 z[a, k] = new[a, k]
                 K[0, a, k] = K[12, a, k]
-        factor = 0.9 * error ** (-0.125) if error > 0.0 else 6.0
-        factor = min(1.0 if rejected else 6.0, max(0.333, factor))
-        rejected = False
         if finished:
             status = DONE
             break
-        h *= factor
+        h *= min(1.0 if rejected else 6.0, max(0.333, 0.9 * error ** (-0.125) if error > 0.0 else 6.0))
+        rejected = False
     return status, s, h, steps, times[: steps * dense + 1], coefficients[: steps * dense]
 
 
 @kernel(inline=True)
-def _keep(field, P, sigma, phase0, rate, low, high, s, h, z, new, n, which, sigma_p, F, J, Fp, x, phase, work, K, out):  # type: ignore[no-untyped-def]
-    """The eight coefficients (8, n) of the dense output of one step."""
-    columns = z.shape[1]
-    for i in range(13, 16):
-        for a in range(n):
-            for k in range(columns):
-                value = 0.0
-                for j in range(i):
-                    value += _A[i, j] * K[j, a, k]
-                work[a, k] = z[a, k] + h * value
-        _slope(field, P, sigma, phase0, rate, low, high, s + _C[i] * h, work, n, which, sigma_p, F, J, Fp, x, phase,
-               K[i])  # fmt: skip
-    for a in range(n):
+def _keep(h, z, new, K, coefficients, q):  # type: ignore[no-untyped-def]
+    """The eight coefficients of the dense output of step q."""
+    for a in range(z.shape[0]):
         change = new[a, 0] - z[a, 0]
-        out[0, a] = z[a, 0]
-        out[1, a] = change
-        out[2, a] = h * K[0, a, 0] - change
-        out[3, a] = 2.0 * change - h * (K[12, a, 0] + K[0, a, 0])
+        coefficients[q, 0, a] = z[a, 0]
+        coefficients[q, 1, a] = change
+        coefficients[q, 2, a] = h * K[0, a, 0] - change
+        coefficients[q, 3, a] = 2.0 * change - h * (K[12, a, 0] + K[0, a, 0])
         for r in range(4):
             value = 0.0
             for i in range(16):
                 value += _D[r, i] * K[i, a, 0]
-            out[4 + r, a] = h * value
+            coefficients[q, 4 + r, a] = h * value
 
 
 @kernel
