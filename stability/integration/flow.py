@@ -4,8 +4,8 @@
 
 The derivative by a parameter of a forced system is taken at fixed phase t / T(p), where it does not grow with t through
 T(p) alone. An interval is cut at the jumps of the right-hand side in time; each piece is one compiled call
-(kernels/runge_kutta.py), order 8 with dense output of order 7. `pieces` is the place where events and saltation enter:
-a piece ends at an event, the state and the variations are mapped, and the next piece starts from there.
+(kernels/runge_kutta.py), order 8 with dense output of order 7. Where the system has stops or switches in its states, the
+pieces end at the events and the variations pass them by saltation (integration/nonsmooth.py).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from ..errors import ConvergenceError, InputError, NonFiniteError
 from ..kernels import runge_kutta
 from .compiled import CompiledField
+from .switches import has_switches
 
 __all__ = ["Flow", "flow"]
 
@@ -55,7 +56,7 @@ class Flow:
         """x(t): (n,) for a number, (n, N) for an array of times inside the interval (only with dense=True)."""
         if self._dense is None:
             raise InputError("this flow was integrated without dense output: pass dense=True")
-        times = np.atleast_1d(np.asarray(t, float)).ravel()
+        times = np.array(t, float, ndmin=1).ravel()
         out = np.empty((len(times), len(self.x)))
         runge_kutta.interpolate(self._dense[0], self._dense[1], times, out)
         return np.asarray(out.T.reshape(len(self.x), *np.shape(t)))
@@ -107,7 +108,6 @@ def flow(
     array([[-1.,  0.],
            [ 0., -1.]])
     """
-    compiled = CompiledField.of(system)
     params = system.parameter_vector() if params is None else np.array(params, float)
     x = system.state_vector(x0)
     n, (t0, t1) = len(x), (float(span[0]), float(span[1]))
@@ -115,7 +115,10 @@ def flow(
         raise InputError(f"span = ({t0:g}, {t1:g}): two ascending finite times are needed")
     if not 1e-15 < rtol < 1 or not (np.asarray(atol, float) > 0).all():
         raise InputError(f"rtol = {rtol:g} must lie in (1e-15, 1), atol = {atol} must be positive")
-    scales = np.ascontiguousarray(np.broadcast_to(np.asarray(atol, float), (n,)))
+    if system.stops or has_switches(system):
+        return _over_events(system, (t0, t1), x, params, rtol, atol, variations, parameters, dense, max_steps)
+    compiled = CompiledField.of(system)
+    scales = np.array(np.broadcast_to(np.asarray(atol, float), (n,)))  # writable, as the kernel was compiled for
     which = [-1] * (n if variations else 0) + [compiled.place(name) for name in parameters]
     z = np.zeros((n, 1 + len(which)))
     z[:, 0] = x
@@ -144,6 +147,32 @@ def flow(
             np.concatenate([k[1] for k in kept]),
         )
     return Flow(t1, z[:, 0].copy(), steps, matrix, by_parameter, stored)
+
+
+def _over_events(
+    system: Any, span: tuple[float, float], x: Array, params: Array, rtol: float, atol: Any, variations: bool,
+    parameters: Sequence[str], dense: bool, max_steps: int,
+) -> Flow:  # fmt: skip
+    from ..results.trajectory import Ending
+    from .engine import Engine, Precision
+
+    precision = Precision(rtol, atol, max_steps)
+    engine = Engine.of(system)
+    try:
+        motion = engine.run(params, x, *span, precision, dense=dense, variations=variations, parameters=parameters)
+    except InputError as error:  # beyond a wall: a Newton iterate may be there, and has to be told so
+        raise ConvergenceError(str(error), t=span[0], x=x.copy(), steps=0) from error
+    if motion.ending is not Ending.COMPLETED:
+        codes = {Ending.DIVERGED: runge_kutta.NOT_FINITE, Ending.MAX_STEPS: runge_kutta.TOO_MANY_STEPS}
+        status = codes.get(motion.ending, runge_kutta.STEP_TOO_SMALL)
+        raise _failure(system, status, motion.t, motion.x, motion.steps)
+    columns, n = motion.variations, len(x)
+    assert columns is not None
+    return Flow(
+        motion.t, motion.x, motion.steps, columns[:, :n].copy() if variations else None,
+        columns[:, n if variations else 0 :].copy() if parameters else None,
+        (motion.edges, motion.nested) if dense else None,
+    )  # fmt: skip
 
 
 def _clock(compiled: CompiledField, params: Array, which: list[int]) -> tuple[float, Array]:

@@ -45,6 +45,14 @@ _NOTES = {kernels.NO_CONVERGENCE: "no convergence", kernels.SINGULAR: "singular"
 _MAX_INTERVALS = 1000
 
 
+def _plain(array: Array) -> Array:
+    """A writable contiguous array: kernels are compiled once for these, and again for every other sort."""
+    flags = array.flags
+    if flags.writeable and flags.c_contiguous and array.dtype == np.float64:
+        return array
+    return np.array(array, float, order="C")
+
+
 def _same(a: Array, b: Array) -> bool:
     return a is b or np.array_equal(a, b)
 
@@ -247,7 +255,7 @@ class Collocation(OrbitDiscretisation):
         work = Workspace(mesh, len(params), len(self.kept))
         arc, t, t_l, weight = 0, u, 0.0, 0.0
         if tangent is not None:
-            arc, t, t_l, weight = 1, tangent.u, float(tangent.parameter), float(tangent.weight)
+            arc, t, t_l, weight = 1, _plain(tangent.u), float(tangent.parameter), float(tangent.weight)
         weights = self.weights if mesh is self.mesh else self._raised_weights
         rule = mesh.rule
         status, iterations, residual, sign, x = kernels.newton(

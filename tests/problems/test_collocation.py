@@ -323,6 +323,26 @@ def test_undamped_orbits_are_neutral_and_strong_contraction_is_known():
     assert abs(np.log(value.real) - divergence) < 1e-3 * abs(divergence)
 
 
+def test_kernels_are_compiled_once_whatever_the_sort_of_array():
+    """Read-only and strided tangents, as from a stored branch, must not start another compilation."""
+    from stability.kernels import condensation_newton
+
+    problem = Collocation(duffing(), winding=np.zeros(2))
+    p = problem.system.parameter_vector()
+    x = problem.start(p)
+    tangent = problem.correct(x, p, "Omega", None, 0.0, 1e-9).tangent
+    before = len(condensation_newton.newton.signatures)
+    strided = np.repeat(tangent.u, 2)[::2]
+    frozen = tangent.u.copy()
+    frozen.setflags(write=False)
+    x.setflags(write=False)
+    for t_u in (strided, frozen):
+        assert problem.correct(x, p, "Omega", tangent._replace(u=t_u), 0.0, 1e-9).converged
+    problem.linearise(x, p)
+    problem.view(x, p)
+    assert len(condensation_newton.newton.signatures) == before == 1
+
+
 def test_carried_error_of_the_multipliers_bounds_the_measured_one():
     """Along a branch on one mesh, the error carried over is never below the one measured at the point itself."""
     system = duffing(beta=0.001)
