@@ -54,7 +54,7 @@ def test_both_ends_of_the_instability_are_those_of_the_mathieu_problem(branches)
 
 
 def test_the_doubled_branch_has_symmetric_orbits_of_twice_the_period(branches):
-    _, semi, swing = branches
+    _, _, swing = branches
     assert swing.status is st.Status.CLOSED_LOOP  # through theta = 0 into its mirror image and back
     orbit = swing.solution(len(swing) // 3)
     omega = float(swing.parameter[len(swing) // 3])
