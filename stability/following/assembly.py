@@ -49,7 +49,7 @@ def _without_twins(entries: list[Entry]) -> list[Entry]:
     for i, j in pairwise(marked):
         kinds = {entries[i].found.kind: i, entries[j].found.kind: j}  # type: ignore[union-attr]
         p, q = entries[i].point, entries[j].point
-        near = abs(p.parameter - q.parameter) * p.tangent.weight < 1e-8 and abs(p.s - q.s) < 1e-2
+        near = abs(p.parameter - q.parameter) * p.tangent.weight < 1e-8 and abs(p.s - q.s) < 2e-4
         if near and set(kinds) == {Kind.FOLD, Kind.BRANCH_POINT}:
             drop.add(kinds[Kind.FOLD])
     return [e for k, e in enumerate(entries) if k not in drop]

@@ -254,7 +254,8 @@ def _is_turning_crossing(change: Changes, located: list[Found], length: float) -
     weight = crossing.tangent.weight
     if fold is None:
         return abs(crossing.tangent.parameter) * weight < 1e-3
-    return abs(fold.parameter - crossing.parameter) * weight < 1e-8 and abs(fold.s - crossing.s) < 0.1 * length + 1e-7
+    gap = abs(fold.s - crossing.s)
+    return abs(fold.parameter - crossing.parameter) * weight < 1e-8 and gap < min(2e-4, 0.1 * length + 1e-7)
 
 
 def _secant(ga: float, gb: float) -> float:
