@@ -9,8 +9,9 @@ up to its last good point; only a Python function that raises is an error.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,14 @@ from ..errors import InputError, NonFiniteError
 from ..kernels import piecewise, runge_kutta
 from ..results.trajectory import Ending, Happening
 from .compiled import CompiledField
+from .events import guards_of
 from .flow import pieces
+from .nonsmooth import follow_events, kept_steps
 
 __all__ = ["Engine", "Motion", "Precision"]
 
 Array = np.ndarray
 _ESCAPED = 1e6  # growth over the largest value so far that tells escape from a jump, where the step collapses
-NO_COLUMNS = np.zeros(0, np.int64), np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -62,9 +64,10 @@ class Motion:
     Attributes
     ----------
     t : float, where it ended;  x : (n,) state there;  steps : int;  ending : Ending
-    edges : (K + 1,);  coefficients : (K, 8, n) Chebyshev, see kernels/piecewise.py (empty unless dense)
+    edges : (K + 1,);  nested : (K, 8, n) dense output as kernels/runge_kutta.py makes it (empty unless dense)
+    coefficients : the same as Chebyshev series, see kernels/piecewise.py
     happenings : tuple of Happening
-    matrix : (n, n) dx(t)/dx(t0), events included, or None
+    variations : (n, k), the columns that were asked for, carried over events
     """
 
     t: float
@@ -72,23 +75,30 @@ class Motion:
     steps: int
     ending: Ending
     edges: Array = field(default_factory=lambda: np.zeros(1))
-    coefficients: Array = field(default_factory=lambda: np.zeros((0, 8, 0)))
+    nested: Array = field(default_factory=lambda: np.zeros((0, 8, 0)))
     happenings: tuple[Happening, ...] = ()
-    matrix: Array | None = None
+    variations: Array | None = None
+    expanded: Array | None = None
+
+    @cached_property
+    def coefficients(self) -> Array:
+        """(K, 8, n) Chebyshev coefficients of the pieces."""
+        return piecewise.from_steps(self.nested) if self.expanded is None else self.expanded
 
 
 class Engine:
     """Integrates one system; made once per system by `Engine.of`, safe to share between threads."""
 
-    def __init__(self, system: Any) -> None:
+    def __init__(self, system: Any, events: tuple[tuple[str, Any], ...] = (), stopping: tuple[str, ...] = ()) -> None:
         self.system = system
         self.compiled = CompiledField.of(system)
         self.address = self.compiled.evaluations.address("F")
+        self.guards = guards_of(system, dict(events), stopping)
 
     @classmethod
-    def of(cls, system: Any) -> Engine:
-        """The engine of a system."""
-        return _engine(system)
+    def of(cls, system: Any, events: Mapping[str, Any] | None = None, stopping: Sequence[str] = ()) -> Engine:
+        """The engine of a system, with events by name (expressions or their text); `stopping` names those that end it."""
+        return _engine(system, tuple((events or {}).items()), tuple(stopping))
 
     @property
     def forced(self) -> bool:
@@ -105,18 +115,34 @@ class Engine:
         return list(pieces(self.compiled, t0, t1, self.period(params), breaks))
 
     def run(
-        self, params: Array, x0: Array, t0: float, t1: float, precision: Precision, *, dense: bool = True, h: float = 0.0
-    ) -> Motion:
-        """From (t0, x0) to t1 > t0, or to where it cannot go on."""
-        period, x = self.period(params), np.array(x0, float).reshape(-1, 1)
-        scales, which = precision.scales(len(x)), NO_COLUMNS
+        self, params: Array, x0: Array, t0: float, t1: float, precision: Precision, *, dense: bool = True,
+        variations: bool = False, parameters: Sequence[str] = (),
+    ) -> Motion:  # fmt: skip
+        """From (t0, x0) to t1 > t0, or to where it cannot go on.
+
+        variations : True carries the columns of dx(t)/dx0;  parameters : names for further columns dx(t)/dp at fixed
+        phase
+        """
+        n = len(x0)
+        which = np.array([-1] * (n if variations else 0) + [self.compiled.place(p) for p in parameters], np.int64)
+        rates, start_columns = self._rates(params, which), np.eye(n, len(which)) if variations else np.zeros((n, len(which)))
         intervals = self.cuts(params, t0, t1)
+        if self.guards is not None:
+            chain, ending = follow_events(
+                self, self.guards, params, x0, t0, t1, precision, intervals, dense=dense, which=which, rates=rates,
+                columns=start_columns,
+            )  # fmt: skip
+            return Motion(chain.t, chain.x, chain.steps, ending, *kept_steps(chain, n), tuple(chain.happenings),
+                          chain.z[:, 1:].copy())  # fmt: skip
+        x = np.ascontiguousarray(np.column_stack([x0, start_columns]))
+        period, scales, h = self.period(params), precision.scales(n), 0.0
+        address = self.compiled.address if len(which) else self.address
         inside = 1e-13 * max(period, abs(t1)) if len(intervals) > 1 else 0.0
         edges, nested, steps, t, status = [np.array([t0])], [], 0, t0, runge_kutta.DONE
         for start, end in intervals:
             status, t, h, count, times, coefficients = runge_kutta.integrate(
-                self.address, params, 1.0, 0.0, 1.0 / period, start, end, x, which[0], which[1], precision.rtol, scales,
-                h, inside, precision.max_steps - steps, int(dense),
+                address, params, 1.0, 0.0, 1.0 / period, start, end, x, which, rates, precision.rtol, scales, h,
+                inside, precision.max_steps - steps, int(dense),
             )  # fmt: skip
             steps += count
             if dense:
@@ -126,7 +152,14 @@ class Engine:
                 break
         state, columns = x[:, 0].copy(), _joined(nested, len(x))
         ending = self.ending(status, t, state, x0)
-        return Motion(float(t), state, steps, ending, np.concatenate(edges), columns)
+        return Motion(float(t), state, steps, ending, np.concatenate(edges), columns, (), x[:, 1:].copy())
+
+    def _rates(self, params: Array, which: Array) -> Array:
+        """T_p / T of the parameters among the variations, zero for directions."""
+        if not self.forced or not (which >= 0).any():
+            return np.zeros(len(which))
+        slope = self.compiled.evaluations.period_gradient(params) / self.period(params)
+        return np.array([slope[k] if k >= 0 else 0.0 for k in which])
 
     def ending(self, status: int, t: float, x: Array, x0: Array) -> Ending:
         """The kernel's status in words; an exception of a Python right-hand side is raised here."""
@@ -144,11 +177,9 @@ class Engine:
 
 
 @lru_cache(maxsize=64)
-def _engine(system: Any) -> Engine:
-    return Engine(system)
+def _engine(system: Any, events: tuple[tuple[str, Any], ...], stopping: tuple[str, ...]) -> Engine:
+    return Engine(system, events, stopping)
 
 
 def _joined(nested: list[Array], n: int) -> Array:
-    if not nested:
-        return np.zeros((0, 8, n))
-    return piecewise.from_steps(np.concatenate(nested))
+    return np.concatenate(nested) if nested else np.zeros((0, 8, n))

@@ -38,6 +38,7 @@ class Ending(StrEnum):
     STEP_TOO_SMALL = "step too small"
     MAX_STEPS = "max steps"
     TOO_MANY_EVENTS = "too many events"
+    SLIDING = "sliding on a switch"
 
 
 class Happening(NamedTuple):

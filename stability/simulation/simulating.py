@@ -2,7 +2,7 @@ r"""`simulate`: a system in time, from given states, to a given accuracy.
 
     x' = f(t, x, p),   x(t0) = x0,          local error per step <= atol + rtol |x|
 
-The compiled explicit Runge-Kutta method of order 8 of integration/engine.py; stiff systems by scipy's implicit methods
+Hard stops, kinks and jumps of the right-hand side in the states, and a user's events are located on the way. The compiled explicit Runge-Kutta method of order 8 of integration/engine.py; stiff systems by scipy's implicit methods
 on request. The result is dense. Motions of a batch run in threads and give the same bytes for any number of them.
 
 Reference: E. Hairer, S. P. Norsett, G. Wanner (1993), Solving Ordinary Differential Equations I.
@@ -10,7 +10,7 @@ Reference: E. Hairer, S. P. Norsett, G. Wanner (1993), Solving Ordinary Differen
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from os import cpu_count
@@ -69,7 +69,8 @@ class Ensemble(Sequence[Trajectory]):
 
 def simulate(
     system: Any, span: tuple[float, float], *, x0: Any = None, rtol: float = 1e-9, atol: Any = 1e-12,
-    method: str = "DOP853", workers: int | None = None, max_steps: int = 2_000_000, **params: Any,
+    method: str = "DOP853", events: Mapping[str, Any] | None = None, stop_at: Sequence[str] = (),
+    workers: int | None = None, max_steps: int = 2_000_000, **params: Any,
 ) -> Any:  # fmt: skip
     """Integrate a system in time: x' = f(t, x, p), x(t0) = x0.
 
@@ -82,6 +83,9 @@ def simulate(
         An array of values (B,), or an array (n, B), makes a batch.
     rtol, atol : float (atol also (n,))
         The local error of a step is kept below atol + rtol |x|.
+    events : mapping of name -> expression, sympy or text such as ``"u - 0.5"``
+        Zeros of the expressions along the motion are recorded in ``trajectory.events``, both ways.
+    stop_at : names of events that end the motion
     method : "DOP853", or "Radau", "BDF", "LSODA" for stiff systems (through scipy)
     workers : number of threads of a batch; default all cores
     max_steps : int
@@ -117,7 +121,9 @@ def simulate(
         raise InputError(f"workers = {workers}: a whole number >= 1 is needed")
     X, P, count = batch(system, x0, params)
     precision.scales(system.n)
-    engine = Engine.of(system)
+    if method != "DOP853" and events:
+        raise InputError("events need method='DOP853'")
+    engine = Engine.of(system, events, (stop_at,) if isinstance(stop_at, str) else stop_at)
 
     def one(k: int) -> Trajectory:
         if method == "DOP853":
@@ -147,7 +153,7 @@ def as_trajectory(engine: Engine, motion: Motion, params: Array, rtol: float) ->
 
     edges, coefficients = motion.edges, motion.coefficients
     if not len(coefficients):  # escaped in the very first step: the start alone is known
-        edges = np.array([edges[0], np.nextafter(edges[0], np.inf)])
+        edges = np.array([edges[0], max(np.nextafter(edges[0], np.inf), edges[0] + 1e-100)])
         coefficients = np.zeros((1, 8, len(motion.x)))
         coefficients[0, 0] = motion.x
     return Trajectory(

@@ -66,4 +66,4 @@ def stiff_motion(
             ending = Ending.DIVERGED if escaped else Ending.STEP_TOO_SMALL
             break
     joined = np.concatenate(columns) if columns else np.zeros((0, 8, len(x)))
-    return Motion(t, x, steps, ending, np.concatenate(edges), joined)
+    return Motion(t, x, steps, ending, np.concatenate(edges), expanded=joined)
