@@ -295,7 +295,7 @@ def duffing_mathieu_amplitudes(
     Returns
     -------
     array, (2, ...)
-        The larger, then the smaller one for beta > 0: stable, unstable (beta < 0: the reverse); NaN where there is none.
+        The larger, then the smaller for beta > 0: stable, unstable (beta < 0: the reverse); NaN where there is none.
 
     Raises
     ------

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 from ..errors import EquationError, InputError
 from .amplitude_equations import AmplitudeEquations, averaged, expanded
 from .slow_systems import slow_system
-from .standard_form import Resonance, Small, StandardForm, standard_form
+from .standard_form import Resonance, Small, StandardForm, check_oscillators, standard_form
 
 if TYPE_CHECKING:
     from ..systems.system import System
@@ -156,6 +156,7 @@ def _slow_flow(
     if variables not in (None, "cartesian", "polar"):
         raise InputError(f"variables = {variables!r}: 'cartesian' or 'polar'")
     free = system.period_expression is None and system.function is None
+    check_oscillators(system)
     if free:
         _check_free(system, resonance)
         return slow_system(method(standard_form(system, order, (1, 1), small)), variables != "cartesian", label, order)

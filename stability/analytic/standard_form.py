@@ -195,10 +195,11 @@ def _linear_part(
                     "coordinates, or a coupling parameter with a positive scaling order (small=); or use "
                     "HarmonicBalance(system)"
                 )
-            free = ", ".join(sorted(s.name for s in term.coefficient.free_symbols)) or "none"
+            names = ", ".join(sorted(s.name for s in term.coefficient.free_symbols))
+            remedy = f"one of its parameters ({names}) or states" if names else "its states"
             raise EquationError(
                 f"the term {shown} in the equation of '{name}' is of order {o}, but only a linear spring and forcing "
-                f"may be: give one of its parameters ({free}) or states a positive scaling order (small=), or use "
+                f"may be: give {remedy} a positive scaling order (small=), or use "
                 "HarmonicBalance(system)"
             )
     values = {symbol(k): v for k, v in system.parameters.items()}

@@ -66,7 +66,7 @@ def linear_oscillator(*, xi: float = 0.021, Omega: float = 1.0, gravity: float =
         parameters=dict(xi=xi, Omega=Omega, gravity=gravity),
         bounds=dict(Omega=_POSITIVE),
         outputs=dict(u_absolute=u + sp.cos(W * t)),
-        orders=dict(xi=1),
+        orders=dict(xi=1, gravity=1, u=-1),  # the base motion is 1, the response at resonance 1/eps
         name="linear_oscillator",
         description="linear oscillator on a moving base",
     )

@@ -77,7 +77,7 @@ def base_driven_pendulum(*, epsilon: float = 0.1, Omega: float = 2.0, xi: float 
         parameters=dict(epsilon=epsilon, Omega=Omega, xi=xi),
         bounds=dict(Omega=_POSITIVE),
         angles=() if linear else ("phi",),
-        orders=dict(epsilon=1, xi=1),
+        orders=dict(epsilon=2, xi=2, phi=1),
         name="base_driven_pendulum",
         description="pendulum with a vertically driven pivot",
     )
@@ -255,7 +255,7 @@ def variable_length_pendulum(
         units=dict(length="m", omega="rad/s", mass="kg", damping="N m s/rad", gravity="m/s^2", phi="rad"),
         bounds=dict(omega=_POSITIVE, length=_POSITIVE, mass=_POSITIVE, epsilon=(-1 + 1e-9, 1 - 1e-9)),
         angles=() if linear else ("phi",),
-        orders=dict(epsilon=1, damping=1),
+        orders=dict(epsilon=2, damping=2, phi=1),
         name="variable_length_pendulum",
         description="pendulum of periodically varying length",
     )

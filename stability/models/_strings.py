@@ -88,7 +88,7 @@ def modulated_string(
         ),
         units=dict(mass="kg", half_length="m", tension="N", omega="rad/s", damping="N s/m", y="m", y_dot="m/s"),
         bounds=dict(omega=_POSITIVE, mass=_POSITIVE, half_length=_POSITIVE),
-        orders=dict(epsilon=1, damping=1),
+        orders=dict(epsilon=2, damping=2, y=1),
         name="modulated_string",
         description="mass on a string of modulated tension",
     )
