@@ -6,7 +6,7 @@ A real periodic function of the phase s in [0, 1) is kept as coefficients (2H + 
 
 With N equispaced samples: synthesis x = G c, analysis c = G+ x (exact for harmonics up to (N - 1)/2), derivative by the
 angle 2 pi s: c -> D c. Multiplication by a function j(s), projected on the same harmonics, is the matrix
-T(j) = G+ diag(j) G, made of the harmonics of j up to 2H (N >= 4H + 1 samples hold them) by
+T(j) = G+ diag(j) G, made of the harmonics of j up to 2H (N >= 4H + 1 samples hold them; the basis asks for one harmonic more) by
 
     cos i cos j = (cos(i-j) + cos(i+j)) / 2   and its like:    T = Toeplitz + Hankel.
 
@@ -113,7 +113,7 @@ class FourierBasis:
     points : (N,) s
     synthesis, slope : (N, 2H + 1), G and G D;  analysis : (2H + 1, N), G+
     k : (2H + 1,) harmonic numbers;  swap : (2H + 1,) and turn : (2H + 1,) of `times_derivative`
-    spectrum : (4H + 1, N) analysis of the harmonics up to 2H
+    spectrum : (4H + 3, N) analysis of the harmonics up to 2H + 1
     """
 
     harmonics: int
@@ -131,7 +131,7 @@ class FourierBasis:
 
     def multiplication(self, values: Array) -> Array:
         """T(j) for samples j (N, q): (2H + 1, 2H + 1, q), rows by columns."""
-        c = self.spectrum @ values
+        c = self.spectrum[:-2] @ values
         half = 0.5 * c
         half[0] = c[0]
         table = np.concatenate([half, -half, np.zeros((1, half.shape[1]))])
@@ -147,7 +147,7 @@ class FourierBasis:
 
 @lru_cache(maxsize=64)
 def fourier_basis(harmonics: int, samples: int) -> FourierBasis:
-    """The basis of H harmonics on N >= 4H + 1 samples, made once.
+    """The basis of H harmonics on N >= 4H + 3 samples, made once.
 
     >>> basis = fourier_basis(3, 16)
     >>> bool(abs(basis.analysis @ basis.synthesis - np.eye(7)).max() < 1e-15)
@@ -155,7 +155,7 @@ def fourier_basis(harmonics: int, samples: int) -> FourierBasis:
     """
     H, N = harmonics, samples
     s = np.arange(N) / N
-    double = series(2 * H, s).T * (2.0 / N)
+    double = series(2 * H + 1, s).T * (2.0 / N)
     double[0] *= 0.5
     k = ranks(H)
     swap = np.arange(2 * H + 1)

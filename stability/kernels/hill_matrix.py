@@ -88,7 +88,7 @@ def selected(
 def koopman_hill(A: Array, omega: float, harmonics: int, subharmonic: bool = True) -> Array:
     """Phi(T) (n, n) = C exp(Hill T) W from samples A (K, n, n) of one period, T = 2 pi / omega.
 
-    K >= 4 H + 1, and >= 8 H + 3 for the subharmonic form, which resolves twice the frequencies.
+    K >= 4 H + 3, and 2 K >= 8 H + 7 for the subharmonic form, which resolves twice the frequencies.
 
     Examples
     --------

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..kernels.fourier import series
+
 from ..kernels.gauss import gauss_rule
 from ..protocols import Corrected, Spectrum, Tangent
 from .harmonic_layout import HarmonicLayout
@@ -40,6 +40,7 @@ __all__ = ["HarmonicBalance"]
 Array = np.ndarray
 _MAX_ITERATIONS = {True: 30, False: 8}
 _DENSE_DEGREE = 9
+_SETTLED = 1e-12
 _MAX_HARMONICS, _MAX_SAMPLES = 1000, 65536
 
 
@@ -55,7 +56,7 @@ class HarmonicBalance(OrbitDiscretisation):
     subharmonic : int
         Orbits of k forcing periods. Autonomous systems have no forcing: leave it at 1.
     samples : int, optional
-        Samples per period N >= 4 H + 2. None: exact for polynomials, and grown by measured aliasing for other terms.
+        Samples per period N >= 4 H + 4. None: exact for polynomials, and grown by measured aliasing for other terms.
     adaptive : bool
         True: harmonics grow and drop so that the estimated error stays below `accuracy`, never below `harmonics`.
         False: H stays; where the estimated error exceeds `accuracy` a TruncationWarning says how many are missing.
@@ -71,7 +72,7 @@ class HarmonicBalance(OrbitDiscretisation):
 
     Notes
     -----
-    *Accuracy*: `error` solves for the harmonics H + 1 .. 2H that the residual in time asks for, and for what they change
+    *Accuracy*: `error` solves for the harmonics H + 1 .. 2H + 1 that the residual in time asks for, and for what they change
     below; it is the largest such change of a state over its scale.
 
     Examples
@@ -117,7 +118,7 @@ class HarmonicBalance(OrbitDiscretisation):
         scales.setflags(write=False)
         object.__setattr__(self, "scales", scales)
         object.__setattr__(self, "winding", winding_vector(self.system, self.winding))
-        least = 4 * self.harmonics + 2
+        least = 4 * self.harmonics + 4
         object.__setattr__(self, "fixed_samples", self.samples is not None)
         if self.samples is None:
             object.__setattr__(self, "samples", first_samples(self.system, self.harmonics, self.subharmonic))
@@ -125,7 +126,7 @@ class HarmonicBalance(OrbitDiscretisation):
             object.__setattr__(self, "samples", whole_number("samples", self.samples, 1, _MAX_SAMPLES))
             if self.samples < least:
                 raise InputError(
-                    f"samples = {self.samples}: {self.harmonics} harmonics need at least 4 H + 2 = {least} samples; "
+                    f"samples = {self.samples}: {self.harmonics} harmonics need at least 4 H + 4 = {least} samples; "
                     "give more samples or fewer harmonics, or leave samples away"
                 )
         layout = HarmonicLayout.of(self.flow, n, self.harmonics, self.samples, self.winding)
@@ -238,7 +239,7 @@ class HarmonicBalance(OrbitDiscretisation):
     def changed(self, **fields: Any) -> HarmonicBalance:
         """A copy with other fields; samples follow the harmonics unless they are given or were given by the user."""
         keep = {"samples": self.samples} if self.fixed_samples or "harmonics" not in fields else {"samples": None}
-        keep["samples"] = max(keep["samples"] or 0, 4 * fields.get("harmonics", self.harmonics) + 2) or None
+        keep["samples"] = max(keep["samples"] or 0, 4 * fields.get("harmonics", self.harmonics) + 4) or None
         if "harmonics" in fields and not self.fixed_samples:
             keep["samples"] = None
         made = dataclasses.replace(self, **{**keep, **fields, "_memo": {}})
@@ -295,6 +296,9 @@ class HarmonicBalance(OrbitDiscretisation):
                 damping = min(damping, -0.5 * u[-1] / step[-1])
             u, params[index] = u + damping * step, params[index] + damping * change_l
             if change <= tolerance * (1 + length):
+                if change > _SETTLED * (1 + length):  # multipliers belong to the point itself, not to the last iterate
+                    L = HarmonicLinearisation(self, u.copy(), params.copy(), given if self.own else None)
+                    residual = L.size_of_residual
                 return self._corrected(u, params, x, tangent, residual, iteration, L, A, free)
             if tangent is not None and iteration > 1 and change > 2 * previous:
                 break
@@ -331,7 +335,7 @@ class HarmonicBalance(OrbitDiscretisation):
         return checked_spectrum(linearisation)
 
     def error(self, u: Array, params: Array) -> float:
-        """Largest change of a state over its scale that the harmonics H + 1 .. 2H would make; inf: unknown."""
+        """Largest change of a state over its scale that the harmonics H + 1 .. 2H + 1 would make; inf: unknown."""
         from .harmonic_truncation import correction
 
         return correction(self.linearise(u, params)).error
@@ -348,7 +352,7 @@ class HarmonicBalance(OrbitDiscretisation):
         """The problem of twice the period, the orbit run through twice, and the antiperiodic direction."""
         from .harmonic_switching import doubled_problem
 
-        return doubled_problem(self, u, params, vector)
+        return doubled_problem(self, u, params)
 
     def pieces(self, u: Array, params: Array) -> tuple[int, Array, Array, float]:
         """The series on 2H pieces, or more, as polynomials of degree 9."""

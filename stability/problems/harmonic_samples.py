@@ -1,8 +1,8 @@
 r"""How many samples in time the projection needs.
 
 A term of degree d in the states and with harmonics up to m of the forcing in its coefficients has harmonics up to
-d H + m of the orbit; on N samples those up to H are exact for N > (d + 1) H + m, and those up to 2H, from which the
-truncation is judged, for N > (d + 2) H + m. Terms that are not polynomials have no such number: N starts at 8 H and
+d H + m of the orbit; on N samples those up to H are exact for N > (d + 1) H + m, and those up to 2H + 1, from which
+the truncation is judged, for N > (d + 2) H + m + 1. Terms that are not polynomials have no such number: N starts at 8 H and
 grows while twice the samples change the projection (`aliasing`).
 """
 
@@ -51,5 +51,5 @@ def first_samples(system: Any, harmonics: int, subharmonic: int, degree: int | N
         known = polynomial_degree(system)
         degree = _UNKNOWN if known is None else min(known, _HIGHEST)
     degree = max(degree, 2)
-    count = (degree + 2) * harmonics + _FORCING * subharmonic + 1
-    return int(2 * np.ceil(max(count, 4 * harmonics + 2) / 2))
+    count = (degree + 2) * harmonics + _FORCING * subharmonic + 2
+    return int(2 * np.ceil(max(count, 4 * harmonics + 4) / 2))

@@ -12,9 +12,9 @@ with the left ones (rows of their inverse) the two-sided Rayleigh quotient
 
     lambda = w^T Hill v / w^T v
 
-differs from Hill's eigenvalue by the product of both residuals. Where that bound is not below 1e-10, Hill's matrix is
-solved whole and its exponents are selected (kernels/hill_matrix). The difference between the two sets of multipliers is
-the error estimate: truncation of orbit and of modes both. A verdict that it does not support is UNDETERMINED.
+differs from Hill's eigenvalue by the product of both residuals. Where that bound is not below 1e-10, a Hill matrix of
+order up to 140 is solved whole and its exponents are selected (kernels/hill_matrix); beyond, the bound joins the error. Twice the difference between the two sets of multipliers
+is the error estimate: truncation of orbit and of modes both. A verdict that it does not support is UNDETERMINED.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ __all__ = ["HillModes", "Propagation", "checked_spectrum", "hill_modes", "indepe
 Array = np.ndarray
 _DEGREE = 5
 _BOUND = 1e-10
+_WHOLE = 140  # order of the largest Hill matrix that is solved whole at an ordinary point
 _APART = 1e-2  # autonomous: nearer multipliers to 1 than this are left to the whole problem
 
 
@@ -133,7 +134,7 @@ def _nodes(problem: HarmonicBalance) -> _Nodes:
         layout = problem.layout
         n, small, S = layout.n, layout.q, max(16, 2 * layout.harmonics + 2)
         s = ((np.arange(S)[:, None] + gauss_rule(_DEGREE).points) / S).ravel()
-        G = series(2 * layout.harmonics, s)
+        G = series(2 * layout.harmonics + 1, s)
         size = _DEGREE * small
         known = problem._memo["nodes"] = _Nodes(
             s, np.mod(problem.multiple * s, 1.0), G, slope_of(G), np.full(S, 1.0 / S), np.empty((S, size, size)),
@@ -172,11 +173,17 @@ def propagated(L: HarmonicLinearisation, found: Correction) -> Propagation | Non
     return Propagation(fundamental[:-1], fundamental[-1], F[0], defect)
 
 
-def _refined(L: HarmonicLinearisation, along: Propagation) -> tuple[Array, Array] | None:
-    """(multipliers along the orbit, Hill multipliers by the Rayleigh quotient), or None where the bound is too large."""
+def _refined(L: HarmonicLinearisation, along: Propagation) -> tuple[Array, Array, float] | None:
+    """(multipliers along the orbit, Hill multipliers by the Rayleigh quotient, bound of its error) or None.
+
+    None where the bound is too large and Hill's matrix small enough to be solved whole, or modes are not independent.
+    """
     layout, T, omega = L.problem.layout, L.period, L.omega
     mu, Y = np.linalg.eig(along.monodromy)
     if not (np.abs(mu) > 1e-200).all():
+        return None
+    used = _not_trivial(mu) if L.problem.own else slice(None)
+    if used is None:
         return None
     exponents = np.log(mu.astype(complex))
     S = len(along.fundamental)
@@ -201,16 +208,23 @@ def _refined(L: HarmonicLinearisation, along: Propagation) -> tuple[Array, Array
     rest = np.sqrt((mean * np.abs(applied - quotient * v) ** 2).sum(axis=(0, 1)))
     size = np.sqrt((np.abs(wt) ** 2 / mean).sum(axis=(0, 1)))
     bound = (rest * size / np.abs(below)) * (rest / np.sqrt((mean * np.abs(v) ** 2).sum(axis=(0, 1)))) / omega
-    if not (bound * T < _BOUND * np.maximum(1.0, 1.0 / np.abs(mu))).all():
+    worst = float((bound * T * np.minimum(1.0, np.abs(mu)))[used].max(initial=0.0))
+    if not worst < (_BOUND if layout.count * n <= _WHOLE else 1e-2):
         return None
     change = quotient * T - exponents
     change = np.where(np.imag(mu) == 0.0, change.real, change)
-    return mu, mu * np.exp(change)
+    return mu[used], (mu * np.exp(change))[used], worst
+
+
+def _not_trivial(mu: Array) -> Array | None:
+    """Indices of all multipliers but the trivial one; None where another is too close to it to be told apart."""
+    order = np.argsort(np.abs(mu - 1))
+    return np.sort(order[1:]) if len(mu) < 2 or abs(mu[order[1]] - 1) > _APART else None
 
 
 def fourier_basis_of(harmonics: int, samples: int) -> Array:
     """Analysis matrix (2H + 1, S) of S >= 2 H + 1 samples."""
-    if samples >= 4 * harmonics + 1:
+    if samples >= 4 * harmonics + 3:
         return fourier_basis(harmonics, samples).analysis
     known = _ANALYSIS.get((harmonics, samples))
     if known is None:
@@ -232,11 +246,11 @@ def checked_spectrum(L: HarmonicLinearisation) -> Spectrum:
         return orbit_spectrum(unknown, np.inf)
     found = correction(L)
     along = propagated(L, found) if np.isfinite(found.error) else None
-    if along is not None and not own:
+    if along is not None:
         refined = _refined(L, along)
         if refined is not None:
-            others, values = refined
-            error = spectrum_distance(values, others) + _floor(along)
+            others, values, bound = refined
+            error = 2 * spectrum_distance(values, others) + bound + _floor(along) + (_drift(L, along) if own else 0.0)
             return orbit_spectrum(_ordered(values), error)
     values, certain = _whole_values(L)
     if along is None or not np.isfinite(values).all():
@@ -246,12 +260,19 @@ def checked_spectrum(L: HarmonicLinearisation) -> Spectrum:
         M, drift = deflated(M, along.flow / problem.scales)
         error += drift
     others = eigenvalues(M)
-    error += spectrum_distance(values, others) + spectrum_distance(others, values)
+    error += 2 * max(spectrum_distance(values, others), spectrum_distance(others, values))
     return orbit_spectrum(values, error)
 
 
+def _drift(L: HarmonicLinearisation, along: Propagation) -> float:
+    """|Phi f - f| / |f| over the scales: the trivial multiplier, measured."""
+    f = along.flow / L.problem.scales
+    image = along.monodromy @ along.flow / L.problem.scales
+    return float(np.linalg.norm(image - f) / np.linalg.norm(f))
+
+
 def _floor(along: Propagation) -> float:
-    return along.defect + 1e-15 * len(along.fundamental) * float(np.abs(along.monodromy).max())
+    return along.defect + 1e-14 * len(along.fundamental) * float(np.abs(along.monodromy).max())
 
 
 def _ordered(values: Array) -> Array:
@@ -276,7 +297,7 @@ def independent_multipliers(problem: HarmonicBalance, u: Array, params: Array) -
     L = problem.linearise(u, params)
     n, H = problem.layout.n, problem.harmonics
     out: dict[str, Array] = {"hill": eigenvalues(L.modes.monodromy)}
-    samples = 8 * H + 4
+    samples = 8 * H + 8
     s = np.arange(samples) / samples
     X = problem.layout.states(L.c, L.omega, s)
     A = problem.evaluations.FJ(np.mod(problem.multiple * s, 1.0), X, L.params)[1]

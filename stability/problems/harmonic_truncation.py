@@ -1,13 +1,14 @@
 r"""How good a truncated Fourier series is, and how many harmonics and samples it should have.
 
-The residual in time of the truncated orbit, f(X) - x', has harmonics H + 1 .. 2H. One Newton step in them, with the mean
+The residual in time of the truncated orbit, f(X) - x', has harmonics H + 1, H + 2, ... Those up to K = 2H + 1 are used. One Newton step in them, with the mean
 of the Jacobian (Z_k = (i k omega)^r - J_0, a small system per harmonic), gives the harmonics that are missing; their
-effect J dX on the equations of the first H, solved with the exact Jacobian, gives the change of those. Where a tangent
+effect J dX on the equations of the first H, and what is left of their own residual, solved with the exact Jacobian,
+gives the change of those. Where a tangent
 of the branch is known the change is taken orthogonally to it, so that a fold does not blow it up. The largest change of
 a state over its scale is the error estimate; for terms that are no polynomials the residual is taken on twice as many
 samples, so that the estimate contains the aliasing, whose share is told apart (`aliasing`).
 
-How many harmonics are missing: the sizes of harmonics 1 .. 2H are fitted by ratio^k and by k^-power; the better fit is
+How many harmonics are missing: the sizes of harmonics 1 .. K are fitted by ratio^k and by k^-power; the better fit is
 extrapolated to the wanted accuracy.
 """
 
@@ -32,8 +33,9 @@ if TYPE_CHECKING:
 __all__ = ["Correction", "adapted", "correction", "missing_harmonics"]
 
 Array = np.ndarray
-_MOST = 1000
-_MOST_SAMPLES = 16384
+_MOST = 63  # harmonics that adaption goes to by itself
+_FAR = 1000  # largest number of missing harmonics that is extrapolated to
+_MOST_SAMPLES = 32  # per harmonic
 _ALIAS = 0.1  # largest share of aliasing in the error that is left alone
 _ROUNDING = 1e-13
 
@@ -41,8 +43,8 @@ _ROUNDING = 1e-13
 class Correction(NamedTuple):
     """What the harmonics that are missing would change.
 
-    coefficients (4H + 1, q) of the corrected orbit, its period; error (largest change of a state over its scale); the
-    part of it that comes from aliasing; sizes (2H,) of harmonics 1 .. 2H over the scales.
+    coefficients (2K + 1, q) of the corrected orbit, its period; error (largest change of a state over its scale); the
+    part of it that comes from aliasing; sizes (K,) of harmonics 1 .. K over the scales.
     """
 
     coefficients: Array
@@ -53,13 +55,13 @@ class Correction(NamedTuple):
 
 
 def _doubled_analysis(problem: HarmonicBalance) -> tuple[Array, Array, Array, Array, Array]:
-    """(points s between the samples, their matrices G and G D of H harmonics, analysis to 2H, phases)."""
+    """(points s between the samples, their matrices G and G D of H harmonics, analysis to K, phases)."""
     known = problem._memo.get("between")
     if known is None:
         layout = problem.layout
         s = layout.basis.points + 0.5 / layout.samples
         G = series(layout.harmonics, s)
-        analysis = series(2 * layout.harmonics, s).T * (2.0 / layout.samples)
+        analysis = series(2 * layout.harmonics + 1, s).T * (2.0 / layout.samples)
         analysis[0] *= 0.5
         phase = np.mod(problem.multiple * s, 1.0)
         known = problem._memo["between"] = (s, G, slope_of(G), analysis, phase)
@@ -67,11 +69,11 @@ def _doubled_analysis(problem: HarmonicBalance) -> tuple[Array, Array, Array, Ar
 
 
 def _upper_basis(problem: HarmonicBalance) -> tuple[Array, Array]:
-    """G and G D (N, 2H) of the harmonics H + 1 .. 2H at the samples."""
+    """G and G D (N, 2H + 2) of the harmonics H + 1 .. K at the samples."""
     known = problem._memo.get("upper")
     if known is None:
         layout = problem.layout
-        G = series(2 * layout.harmonics, layout.basis.points)
+        G = series(2 * layout.harmonics + 1, layout.basis.points)
         known = problem._memo["upper"] = (
             np.ascontiguousarray(G[:, layout.count :]), np.ascontiguousarray(slope_of(G)[:, layout.count :])
         )
@@ -79,10 +81,10 @@ def _upper_basis(problem: HarmonicBalance) -> tuple[Array, Array]:
 
 
 def correction(L: HarmonicLinearisation) -> Correction:
-    """One Newton step in twice as many harmonics; see the head of this file."""
+    """One Newton step in the harmonics up to K = 2H + 1; see the head of this file."""
     problem, layout = L.problem, L.problem.layout
     H, q, rows = layout.harmonics, layout.q, layout.rows
-    failed = Correction(resized(L.c, 2 * H), L.period, np.inf, 0.0, np.zeros(2 * H))
+    failed = Correction(resized(L.c, 2 * H + 1), L.period, np.inf, 0.0, np.zeros(2 * H + 1))
     if not np.isfinite(L.J).all():
         return failed
     force = layout.basis.spectrum @ L.F[:, rows]
@@ -100,7 +102,7 @@ def correction(L: HarmonicLinearisation) -> Correction:
     change[:, layout.unknowns] = G_upper @ upper
     change[:, velocities] = L.omega * (slope_upper @ upper[:, places])
     pushed = np.einsum("kij,kj->ki", L.J[:, rows], change)
-    lower = layout.basis.analysis @ pushed
+    lower = layout.basis.analysis @ pushed - L.residual[: layout.count * q].reshape(layout.count, q)
     step = _lower_step(L, np.stack([(lower + alias).ravel(), alias.ravel()], axis=1))
     if step is None:
         return failed
@@ -120,12 +122,12 @@ def correction(L: HarmonicLinearisation) -> Correction:
 
 
 def _upper_harmonics(L: HarmonicLinearisation, force: Array) -> Array:
-    """(2H, q): Z_k x_k = f_k for the harmonics H + 1 .. 2H."""
+    """(2H + 2, q): Z_k x_k = f_k for the harmonics H + 1 .. K."""
     layout = L.problem.layout
     H = layout.harmonics
     places, velocities = layout.pairs
     mean = L.J[:, layout.rows].mean(axis=0)
-    ik = 1j * L.omega * np.arange(H + 1, 2 * H + 1)[:, None, None]
+    ik = 1j * L.omega * np.arange(H + 1, 2 * H + 2)[:, None, None]
     Z = np.where(layout.second, ik**2, ik) * np.eye(layout.q) - mean[:, layout.unknowns]
     Z[:, :, places] -= ik * mean[:, velocities]
     right = force[::2] - 1j * force[1::2]
@@ -166,7 +168,7 @@ def _lower_step(L: HarmonicLinearisation, force: Array) -> Array | None:
 
 # ---------------------------------------------------------------------- what to do about it
 def missing_harmonics(found: Correction, accuracy: float) -> int:
-    """How many more harmonics bring the error below `accuracy`, by the decay of the sizes; at least 1, at most 1000.
+    """How many more harmonics bring the error below `accuracy`, by the decay of the sizes; at least 1, at most 1000 (no power law is trusted further).
 
     0 where the error is small enough already.
     """
@@ -181,7 +183,7 @@ def missing_harmonics(found: Correction, accuracy: float) -> int:
         more = excess / max(-math.log(max(ratio, 1e-6)), 1e-3)
     else:
         more = H * (math.exp(min(excess / max(power, 0.5), 7.0)) - 1)
-    return int(min(max(math.ceil(more), 1), _MOST))
+    return int(min(max(math.ceil(more), 1), _FAR))
 
 
 def adapted(
@@ -201,7 +203,7 @@ def adapted(
     if harmonics != problem.harmonics:
         fields["harmonics"] = harmonics
     elif not problem.fixed_samples and found.aliasing > _ALIAS * found.error and found.aliasing > _ROUNDING:
-        if problem.samples < _MOST_SAMPLES:
+        if problem.samples < _MOST_SAMPLES * harmonics:
             fields["samples"] = 2 * problem.samples
     if not problem.adaptive or harmonics >= _MOST:
         warn_of_truncation(problem, found._replace(error=worst), params)
@@ -220,7 +222,7 @@ def _carried(old: HarmonicBalance, new: HarmonicBalance, u: Array) -> Array:
 def _wanted_harmonics(problem: HarmonicBalance, found: Correction) -> int:
     H, accuracy = problem.harmonics, problem.accuracy
     if found.error > accuracy:
-        return min(_MOST, H + min(max(missing_harmonics(found, 0.3 * accuracy), 1), max(H, 2)))
+        return min(max(_MOST, problem.fewest), H + min(max(missing_harmonics(found, 0.3 * accuracy), 1), max(H, 2)))
     tail = np.cumsum(found.sizes[::-1])[::-1]  # tail[k]: harmonics above k
     enough = int(np.argmax(np.append(tail, 0.0) < 1e-2 * accuracy))
     lower = max(enough, problem.fewest, math.ceil(2 * H / 3), 1)
