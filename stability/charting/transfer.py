@@ -173,16 +173,23 @@ class LinearResponse:
         own = {symbol(k): v for k, v in self.system.parameters.items() if k != name}
         numerator, denominator = sp.fraction(sp.together(self.transfer(output).subs(own)))
         top, bottom = (_modulus_squared(sp.Poly(p, LAPLACE)) for p in (numerator, denominator))
-        slope: Array = np.polysub(np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom)))
-        roots = np.roots(np.trim_zeros(np.where(np.abs(slope) < 1e-14 * np.abs(slope).max(), 0.0, slope), "f"))
+        unit = _typical_square(bottom)  # x = w^2 in this unit: SI coefficients span dozens of powers of ten
+        top, bottom = (c * unit ** np.arange(len(c) - 1.0, -1, -1) for c in (top, bottom))
+        one, two = np.polymul(np.polyder(top), bottom), np.polymul(top, np.polyder(bottom))
+        size = np.polyadd(
+            np.polymul(np.abs(np.polyder(top)), np.abs(bottom)), np.polymul(np.abs(top), np.abs(np.polyder(bottom)))
+        )
+        slope: Array = np.polysub(one, two)
+        roots = np.roots(np.trim_zeros(np.where(np.abs(slope) < 1e-14 * size, 0.0, slope), "f"))
         squares = np.sort(roots[(np.abs(roots.imag) < 1e-7 * np.abs(roots)) & (roots.real > 0)].real)
         ends = [0.0, 1e8 * (1.0 + (squares.max() if squares.size else 1.0))]
         x = np.concatenate([ends[:1], squares, ends[1:]])
-        heights = np.sqrt(np.maximum(np.polyval(top, x) / np.polyval(bottom, x), 0.0))
+        with np.errstate(divide="ignore"):  # an undamped resonance is infinite
+            heights = np.sqrt(np.maximum(np.polyval(top, x) / np.polyval(bottom, x), 0.0))
         found = []
         for k in range(1, len(x) - 1):
             if heights[k] > (1 + prominence) * max(heights[k - 1], heights[k + 1]):
-                found.append((float(np.sqrt(x[k]) / scale), float(heights[k])))
+                found.append((float(np.sqrt(x[k] * unit) / scale), float(heights[k])))
         return found
 
     def periodic(self, coefficients: Mapping[int, complex] | Sequence[complex], frequency: float, output: str) -> Any:
@@ -287,6 +294,13 @@ def _modulus_squared(polynomial: sp.Poly) -> Array:
     powers = c * 1j ** np.arange(len(c))
     squared = np.convolve(powers, powers.conj()).real  # in powers of w; odd ones cancel
     return squared[::2][::-1]
+
+
+def _typical_square(bottom: Array) -> float:
+    """Geometric mean of the moduli of the roots of |D|^2 in w^2, the natural frequencies squared."""
+    moduli = np.abs(np.roots(bottom))
+    moduli = moduli[moduli > 0]
+    return float(np.exp(np.log(moduli).mean())) if moduli.size else 1.0
 
 
 def linear_response(system: System, about: Any = None, **params: float) -> LinearResponse:
