@@ -56,6 +56,19 @@ def test_chain_peaks(Omega0, name, expected):
         assert height == pytest.approx(y, abs=5e-4 if y < 2 else 5e-3)
 
 
+@pytest.mark.parametrize("excitation", [dict(acceleration=4.905), dict(amplitude=1e-4)])
+@pytest.mark.parametrize("name", ["y1", "y2", "y1_mm"])
+def test_peaks_in_si_units_are_those_of_the_curve(excitation, name):
+    """The peaks of a polynomial whose coefficients span many powers of ten against a dense frequency response."""
+    response = st.linear_response(M.chain.from_physical(**excitation))
+    f = np.linspace(5, 45, 80001)
+    a = abs(response.frequency_response(f, name))
+    inner = np.flatnonzero((a[1:-1] > a[:-2]) & (a[1:-1] > a[2:])) + 1
+    found = [peak for peak in response.peaks(name) if peak[0] < 45]
+    assert [x for x, _ in found] == pytest.approx(f[inner], abs=1e-3)
+    assert [x for _, x in found] == pytest.approx(a[inner], rel=1e-6)
+
+
 def test_every_transfer_function_is_a_direct_complex_solve():
     """Z(f) = C (j w - A)^-1 B by numpy from differences of the equations of motion, to 1e-12."""
     cases = [
