@@ -180,12 +180,15 @@ class Collocation(OrbitDiscretisation):
     def pieces(self, u: Array, params: Array) -> tuple[int, Array, Array, float]:
         """(degree d, edges (K + 1,) in [0, 1], values (K, d + 1, n) at (0, Gauss points), period) of the whole orbit.
 
-        The Newton step at degree m + 1 that estimates the error has a better polynomial than u: that one is given.
+        Nodes are more accurate than the polynomial between them. On every interval by itself the initial value problem
+        from its left node is solved by one Newton step of a higher degree, which makes both equally accurate.
         """
-        refined, mesh = self.refined(u, params), self.mesh
-        if refined is not None:
-            mesh, u = mesh.raised[0], refined[1]
-        nodes, stages, rest = mesh.split(u)
+        mesh = self.mesh.dense
+        nodes, stages, rest = self.mesh.split(u)
+        stages = self.mesh.resample(mesh, nodes, stages)
+        work, stage, sign = self._condensed(mesh, nodes, stages, rest, params, True)
+        if sign != 0.0:
+            stages = stages - stage
         values, edges = mesh.polynomial(nodes, stages), mesh.edges
         if self.halved:
             values = np.concatenate([values, values @ self.closure.T + self.winding])
@@ -201,7 +204,7 @@ class Collocation(OrbitDiscretisation):
     @cached_property
     def _raised_weights(self) -> Array:
         """`weights` on the mesh of degree m + 1."""
-        higher = self.mesh.raised[0]
+        higher = self.mesh.raised
         nodes = np.zeros((higher.intervals + 1, higher.n))
         return higher.join(nodes, higher.quadrature(self.scales), self.period_scale**-2)
 
@@ -293,10 +296,18 @@ class Collocation(OrbitDiscretisation):
 
     def linearise(self, u: Array, params: Array) -> CollocationLinearisation:
         """The linearisation at (u, params)."""
-        mesh, rule = self.mesh, self.mesh.rule
         u, params = np.array(u, float), np.array(params, float)
-        nodes, stages, rest = mesh.split(u)
-        work = Workspace(mesh, len(params), len(self.kept))
+        nodes, stages, rest = self.mesh.split(u)
+        work, _, sign = self._condensed(self.mesh, nodes, stages, rest, params, False)
+        if sign == 0.0:
+            work.M[:], work.Z[:] = np.nan, np.nan
+        return CollocationLinearisation(self, u, params, work, sign)
+
+    def _condensed(
+        self, mesh: OrbitMesh, nodes: Array, stages: Array, rest: Array, params: Array, correct: bool
+    ) -> tuple[Workspace, Array, float]:
+        """(arrays, G^-1 stage residuals where `correct`, sign) of one evaluation and elimination; sign 0: failed."""
+        rule, work = mesh.rule, Workspace(mesh, len(params), len(self.kept))
         work.T[:] = rest if mesh.own else 0.0
         stage, node = np.empty_like(stages), np.empty_like(nodes)
         residual, sigma = kernels.evaluate(
@@ -304,16 +315,14 @@ class Collocation(OrbitDiscretisation):
             self.closure, self.winding, self.scales, params, nodes, stages, work.T, work.F, work.J, work.Fp, work.dT,
             stage, node,
         )  # fmt: skip
-        sign = 0.0
-        if residual < np.inf and np.isfinite(work.J).all():
-            empty = np.empty((mesh.intervals, mesh.degree * mesh.n, 0))
-            sign = kernels.condense(
-                rule.inverse, rule.matrix, rule.row_sums, rule.update, mesh.h, sigma, work.J, self.kept, self.position,
-                empty, work.LU, work.pivots, work.Z, work.M,
-            )  # fmt: skip
-        if sign == 0.0:
-            work.M[:], work.Z[:] = np.nan, np.nan
-        return CollocationLinearisation(self, u, params, work, sign)
+        if not (residual < np.inf and np.isfinite(work.J).all()):
+            return work, stage, 0.0
+        columns = stage[:, :, None].copy() if correct else np.empty((*stage.shape, 0))
+        sign = kernels.condense(
+            rule.inverse, rule.matrix, rule.row_sums, rule.update, mesh.h, sigma, work.J, self.kept, self.position,
+            columns, work.LU, work.pivots, work.Z, work.M,
+        )  # fmt: skip
+        return work, columns[:, :, 0] if correct else stage, float(sign)
 
     # ------------------------------------------------------------------ meshes and doubled orbits
     def adapt(
@@ -335,14 +344,15 @@ class Collocation(OrbitDiscretisation):
             return found_before
         mesh = self.mesh
         nodes, stages, rest = mesh.split(u)
-        higher = mesh.raised[0]
-        start = higher.join(nodes, mesh.raise_degree(nodes, stages), rest)
+        higher = mesh.raised
+        start = higher.join(nodes, mesh.resample(higher, nodes, stages), rest)
         index, tangent = 0, None
         at = self._memo.get("tangent")
         if at is not None and _same(at[0], u):
             index, t = at[1], at[2]
             t_nodes, t_stages, t_rest = mesh.split(t.u)
-            tangent = Tangent(higher.join(t_nodes, mesh.raise_degree(t_nodes, t_stages), t_rest), t.parameter, t.weight)
+            t_stages = mesh.resample(higher, t_nodes, t_stages)
+            tangent = Tangent(higher.join(t_nodes, t_stages, t_rest), t.parameter, t.weight)
         found = self._newton(higher, start, params, index, tangent, 0.0, np.inf, 1)
         result: Any = None
         if found.converged:

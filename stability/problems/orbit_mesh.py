@@ -105,14 +105,19 @@ class OrbitMesh:
         return out
 
     @cached_property
-    def raised(self) -> tuple[OrbitMesh, Array]:
-        """The mesh of degree m + 1 and the matrix (m + 1, m + 1) from polynomial values to its stage values."""
-        higher = OrbitMesh(self.edges, self.degree + 1, self.n, self.span, self.own)
-        return higher, lagrange_matrix(self.rule.abscissae, higher.rule.points)
+    def raised(self) -> OrbitMesh:
+        """The mesh of degree m + 1."""
+        return OrbitMesh(self.edges, self.degree + 1, self.n, self.span, self.own)
 
-    def raise_degree(self, nodes: Array, stages: Array) -> Array:
-        """Stage values (N, (m + 1) n) of the same polynomial on the mesh of degree m + 1."""
-        matrix = self.raised[1]
+    @cached_property
+    def dense(self) -> OrbitMesh:
+        """The mesh whose polynomials are as accurate between the nodes as the nodes are (degree 2m, at most 11)."""
+        degree = min(2 * self.degree, 11) if self.n <= 8 else min(self.degree + 2, 11)
+        return OrbitMesh(self.edges, max(degree, self.degree), self.n, self.span, self.own)
+
+    def resample(self, other: OrbitMesh, nodes: Array, stages: Array) -> Array:
+        """Stage values (N, m' n) of the same polynomial for another degree on the same edges."""
+        matrix = lagrange_matrix(self.rule.abscissae, other.rule.points)
         return (matrix @ self.polynomial(nodes, stages)).reshape(self.intervals, -1)
 
     def quadrature(self, scales: Array) -> Array:

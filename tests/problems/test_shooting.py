@@ -137,6 +137,30 @@ def test_folds_of_the_duffing_peak_are_those_of_collocation(segments):
         assert min(abs(point.multipliers - 1)) < 1e-6
 
 
+@pytest.mark.parametrize("omega", (2.6, 0.8))
+def test_strongly_nonlinear_orbits_between_the_nodes(omega):
+    """x'' + 0.1 x' + x + x^3 = 25 cos(omega t): the orbit of collocation, anywhere in time, to its stated error."""
+    system = st.models.duffing_textbook(delta=0.1, alpha=1.0, beta=1.0, gamma=25.0, omega=omega)
+    p = system.parameter_vector()
+    problem = Collocation(system)
+    x = problem.start(p, {system.states[0]: 3.0})
+    for _ in range(8):
+        better = problem.adapt(x, p, None)
+        if better is None:
+            break
+        problem, x, _ = better
+        x = problem.start(p, x)
+    orbit = problem.view(x, p)
+    other = Shooting(system, segments=5, rtol=1e-12, atol=1e-13)
+    same = other.view(other.start(p, orbit), p)
+    times = np.linspace(0, orbit.period, 997)
+    assert orbit.error <= 1e-9
+    assert np.abs((orbit(times) - same(times)) / problem.scales[:, None]).max() < 2e-9
+    assert orbit.verdict is same.verdict
+    columns = problem.measures(x, p)
+    assert abs(columns[f"{system.states[0]}.max"] - same.max[system.states[0]]) < 1e-8
+
+
 def test_verdicts_of_meshes_and_segments_agree():
     """10, 20, 40 intervals; 1, 3, 5 segments: stable and unstable solutions of the detached family."""
     system = duffing()
