@@ -209,10 +209,8 @@ def matched_growth(points: tuple[Point, Point, Point], which: int) -> NDArray[np
     """
     spectra = [p.spectrum.values for p in points]
     middle = spectra[1]
-    if not spectra[0].size == middle.size == spectra[2].size:
-        return np.zeros((3, 0))
     wanted = middle.imag == 0 if which == -1 else middle.imag > 0
-    if not wanted.any():
+    if not spectra[0].size == middle.size == spectra[2].size or not wanted.any():
         return np.zeros((3, 0))
     matched = np.array([spectra[0][_assigned(middle, spectra[0])], middle, spectra[2][_assigned(middle, spectra[2])]])
     matched = matched[:, wanted]

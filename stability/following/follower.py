@@ -226,7 +226,8 @@ class Follower(Iterator[Point]):
                 self.status = Status.CLOSED_LOOP if returned else Status.STOPPED
                 self.before, self.last = None, point
                 return True
-        self.entries.sort(key=lambda e: e.point.s)
+        if found and found[0].point.s < self.last.s:  # seen late: it belongs before the last point
+            self.entries.sort(key=lambda e: e.point.s)
         return False
 
     def _named_stop(self, found: Found) -> bool:
@@ -269,7 +270,7 @@ class Follower(Iterator[Point]):
         self._growth *= self._norm_of(old) / max(self._norm_of(new), 1e-300)
         self.since_adapt = 0
         self.last = new
-        where = max(i for i, e in enumerate(self.entries) if e.point is old)
+        where = next(i for i in range(len(self.entries) - 1, -1, -1) if self.entries[i].point is old)
         self.entries[where] = Entry(new, self.entries[where].found)
 
     # ------------------------------------------------------------------ events of a segment

@@ -81,12 +81,22 @@ def spectral_motion(a: NDArray[np.complex128], b: NDArray[np.complex128], circle
     """
     if not a.size or not b.size:
         return 0.0
+    if circle and a.size <= 3:
+        first, second = a.tolist(), b.tolist()
+        return max(_farthest(first, second), _farthest(second, first))
     gap = np.abs(a[:, None] - b[None, :])
     if circle:
         gap /= np.sqrt(np.multiply.outer(1 + np.abs(a) ** 2, 1 + np.abs(b) ** 2))
     else:
         gap /= 1e-300 + np.maximum.outer(np.abs(a), np.abs(b)) + 0.1 * max(rate, float(np.abs(b).max()))
     return float(max(gap.min(axis=1).max(), gap.min(axis=0).max()))
+
+
+def _farthest(a: list[complex], b: list[complex]) -> float:
+    """Largest chordal distance of a multiplier of `a` from the set `b`."""
+    return max(
+        min(abs(x - y) / math.sqrt((1 + abs(x) ** 2) * (1 + abs(y) ** 2)) for y in b) for x in a
+    )
 
 
 def compare(last: Point, new: Point, guess: tuple[Array, float], rate: float = 0.0) -> Comparison:
@@ -118,14 +128,17 @@ def room(last: Point, new: Point) -> float:
     if not b.size or a.size != b.size:
         return math.inf
     before, now = [last.tests[0], last.tests[1]], [new.tests[0], new.tests[1]]
-    nearest = np.abs(b[:, None] - a[None, :]).argmin(axis=1)
-    if last.problem.critical.circle:
-        with np.errstate(divide="ignore"):
-            before += np.log(np.abs(a[nearest])).tolist()
-            now += np.log(np.abs(b)).tolist()
-    else:
-        before += a.real[nearest].tolist()
-        now += b.real.tolist()
+    earlier = a.tolist()
+    circle = last.problem.critical.circle
+    for value in b.tolist():
+        like = min(earlier, key=lambda z, v=value: abs(z - v))  # type: ignore[misc]
+        if circle:
+            if value and like:
+                before.append(math.log(abs(like)))
+                now.append(math.log(abs(value)))
+        else:
+            before.append(like.real)
+            now.append(value.real)
     least = math.inf
     for x, y in zip(before, now):
         if x * y > 0 and abs(y) < abs(x):
