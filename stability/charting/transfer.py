@@ -149,7 +149,12 @@ class LinearResponse:
         c = np.array(row.subs(own).tolist(), dtype=complex)[0]
         d = _columns(sp.Matrix([feed.subs(own)]), symbol(name), values)[:, 0]
         matrices = 1j * w[:, None, None] * np.eye(len(self.A)) - self.A
-        out = np.linalg.solve(matrices, g[..., None])[..., 0] @ c + d
+        try:
+            out = np.linalg.solve(matrices, g[..., None])[..., 0] @ c + d
+        except np.linalg.LinAlgError:
+            raise InputError(
+                f"an undamped resonance stands at one of the values of '{name}': the response is infinite"
+            ) from None
         return out if np.ndim(frequency) else out[0]
 
     def peaks(self, output: str, prominence: float = 1e-3) -> list[tuple[float, float]]:
@@ -276,6 +281,11 @@ class LinearResponse:
         if any(e.has(TIME) for e in row):
             raise EquationError(
                 f"output '{name}' multiplies states with functions of time: it has no transfer function"
+            )
+        if not any(row) and expression.free_symbols & set(states):
+            raise EquationError(
+                f"output '{name}' has no linear part about the equilibrium: it has no transfer function; compute it "
+                "from the responses of the states or of another output (a mean power from |current|^2)"
             )
         _, first = harmonic_parts(expression.xreplace(at).xreplace(rest), system)
         return sp.Matrix([row]), first

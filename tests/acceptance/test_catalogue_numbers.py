@@ -92,6 +92,14 @@ def test_every_transfer_function_is_a_direct_complex_solve():
             assert response.frequency_response(value, state) == pytest.approx(Z[k], rel=1e-12, abs=scale)
 
 
+def test_responses_that_do_not_exist_are_typed_errors():
+    """A power is quadratic (its linear part is zero, not its value); an undamped resonance is infinite."""
+    with pytest.raises(st.errors.EquationError, match="no linear part"):
+        st.linear_response(M.harvester.from_physical()).frequency_response(20.0, "power_mW")
+    with pytest.raises(st.errors.InputError, match="undamped resonance"):
+        st.linear_response(M.linear_oscillator(xi=0.0)).frequency_response(1.0, "u")
+
+
 def test_static_positions():
     rest = st.linear_response(M.chain.from_physical(gravity=True)).equilibrium
     assert rest["y1"] == pytest.approx(-0.03 * G / 571.22, rel=1e-12)
