@@ -13,6 +13,7 @@ from ._version import __version__ as __version__
 
 # public name -> module that defines it
 _EXPORTS: dict[str, str] = {
+    "locus": "problems.locus",
     "switch": "problems.switching",
     "solve": "following.driver",
     "continuation": "following.driver",

@@ -1,0 +1,421 @@
+r"""`locus`: the curve of special points in two parameters, as a problem for the same `continuation`.
+
+A fold, Hopf, period-doubling, Neimark-Sacker or (where it persists) branch point is an isolated zero of its defining
+system (`defining`) at one parameter; with a second one free these zeros are curves. Unknowns (u, lambda_2, e) over the
+continued lambda_1; the inner product is that of the inner problem plus (lambda_2 / scale_2)^2, e does not count.
+
+Of the spectrum the critical values are taken out: the verdict says whether the others are inside. STABLE: the curve
+bounds a stable region. A branch point persists where a symmetry or a trivial solution makes it: its unfolding parameter
+mu stays zero; anywhere else a second parameter breaks it into folds, and the curve does not start.
+References: Kuznetsov (2004), 10.3; Govaerts (2000), chapter 4.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConvergenceError, InputError, unknown_name
+from ..protocols import Corrected, Critical, Problem, Seed, Spectrum, Tangent
+from ..results.revival import revive
+from ..results.special import SpecialPoint
+from ..words import Kind, Verdict
+from .defining import first_extra
+from .locus_system import ExtendedLinearisation
+
+__all__ = ["Locus", "locus"]
+
+Array = NDArray[np.float64]
+_KINDS = (Kind.FOLD, Kind.BRANCH_POINT, Kind.HOPF, Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER)
+_PAIRS = (Kind.HOPF, Kind.NEIMARK_SACKER)
+_MAX_NEWTON = 10
+_UNFOLDED = 1e-7
+_SMALLEST_SCALE = 0.05  # of the first scale of the second parameter
+
+
+@dataclass(frozen=True, eq=False)
+class Locus:
+    """A curve of special points of one kind; made by `locus`.
+
+    Attributes
+    ----------
+    inner : Problem whose special points these are
+    kind : Kind
+    free : str, the second parameter lambda_2;  along : str, the one along which the point was found
+    scale : float, size of lambda_2 in the inner product;  least : float, its lower bound
+    """
+
+    inner: Any
+    kind: Kind
+    free: str
+    along: str
+    scale: float
+    least: float
+    born: tuple[Array, Array, Array, float] | None = field(default=None, repr=False)  # U, params, direction, rate
+
+    # ------------------------------------------------------------------ layout
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """Those of the inner problem (the value of lambda_2 there is that of the solution, not an input)."""
+        return self.inner.parameters  # type: ignore[no-any-return]
+
+    @property
+    def extras(self) -> int:
+        """Number of extra unknowns."""
+        return 1 if self.kind in _PAIRS or self.kind is Kind.BRANCH_POINT else 0
+
+    @property
+    def _place(self) -> int:
+        return list(self.inner.parameters).index(self.free)
+
+    def parts(self, U: Array) -> tuple[Array, float, Array]:
+        """(u, lambda_2, e)."""
+        n = U.size - 1 - self.extras
+        return U[:n], float(U[n]), U[n + 1 :]
+
+    def completed(self, U: Array, params: Array) -> Array:
+        """A copy of `params` with lambda_2 of U."""
+        params = np.array(params, dtype=float)
+        params[self._place] = self.parts(U)[1]
+        return params
+
+    @property
+    def weights(self) -> Array:
+        """(N + 1 + e,) those of the inner problem, 1 / scale^2, zeros."""
+        return np.concatenate([self.inner.weights, [self.scale**-2], np.zeros(self.extras)])
+
+    @property
+    def critical(self) -> Critical:
+        """No special points of its own by spectrum."""
+        return Critical(self.inner.critical.circle, None, None)
+
+    @property
+    def system(self) -> Any:
+        """That of the inner problem."""
+        return self.inner.system
+
+    @property
+    def spec(self) -> Mapping[str, Any]:
+        """Plain data; `from_spec` is the inverse."""
+        own = {"problem": "Locus", "kind": str(self.kind), "free": self.free, "along": self.along}
+        born = None if self.born is None else [np.asarray(part).tolist() for part in self.born]
+        inner = dict(self.inner.spec)
+        flag = {"view_only": True} if inner.get("view_only") else {}
+        return {**own, "scale": self.scale, "least": self.least, "born": born, "inner": inner, **flag}
+
+    @classmethod
+    def from_spec(cls, spec: Mapping[str, Any]) -> Locus:
+        """The problem that `spec` describes."""
+        born = spec["born"]
+        if born is not None:
+            born = (*(np.array(part, dtype=float) for part in born[:3]), float(born[3]))
+        fields = {key: spec[key] for key in ("free", "along", "scale", "least")}
+        return cls(revive(spec["inner"]), Kind(spec["kind"]), born=born, **fields)
+
+    # ------------------------------------------------------------------ start
+    def seed(self) -> Seed | None:
+        """The point it was made from; followed to both sides."""
+        if self.born is None:
+            return None
+        U, params, direction, rate = self.born
+        return Seed(self, U, params, direction, rate, 2, Kind.USER, self.along)
+
+    def start(self, params: Array, guess: Any = None) -> Array:
+        """U of a solution on another mesh of this curve (with its own value of lambda_2).
+
+        Raises
+        ------
+        InputError
+            Anything else: a curve of special points starts from a special point.
+        """
+        values = getattr(guess, "params", None)
+        if values is None:
+            raise InputError("a curve of special points starts from a special point: locus(branch['PD1'], free=...)")
+        params = np.array(params, dtype=float)
+        params[self._place] = values[self.free]
+        u = self.inner.start(params, guess)
+        spectrum = self.inner.spectrum(self.inner.linearise(u, params))
+        return np.concatenate([u, [values[self.free]], first_extra(self.kind, self.inner.critical, spectrum.values)])
+
+    # ------------------------------------------------------------------ Newton
+    def linearise(self, u: Array, params: Array) -> ExtendedLinearisation:
+        """The extended linearisation at any point."""
+        other = self.along if self.along != self.free else next(n for n in self.parameters if n != self.free)
+        return ExtendedLinearisation.at(self, u, params, other)
+
+    def correct(
+        self, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
+    ) -> Corrected:
+        """The bordered Newton solve of `locus_system`, quadratically convergent."""
+        k, n = list(self.parameters).index(free), u.size
+        params, w = np.array(params, dtype=float), self.weights
+        if tangent is not None:
+            u, params[k] = u + ds * tangent.u, params[k] + ds * tangent.parameter
+        row = self._row(tangent, n)
+        right = np.zeros((n + 1, 2))
+        right[n, 1] = 1.0
+        weight = 0.0 if tangent is None else tangent.weight
+        last, begun = math.inf, self._ordered(u, params[k])
+        for iteration in range(1, _MAX_NEWTON + 1):
+            try:
+                L = ExtendedLinearisation.at(self, u, params, free)
+            except np.linalg.LinAlgError:
+                return _failed(u, params, iteration, "singular")
+            right[:n, 0] = -L.residual
+            right[n, 0] = -float(row @ (self._ordered(u, params[k]) - begun))
+            step = L.solve_bordered(row, right)
+            du, dl = self._split(step[:, 0])
+            size = math.sqrt(float(w @ du**2) + (weight * dl) ** 2) if np.isfinite(step).all() else math.nan
+            scale = 1.0 + math.sqrt(float(w @ u**2))
+            if not math.isfinite(size):
+                return _failed(u, params, iteration, "singular")
+            u = u + du
+            params[k] += dl
+            if size <= tolerance * scale and self._extra_settled(du, u):
+                return self._succeeded(u, params, free, tangent, step[:, 1], iteration)
+            if (iteration > 2 and size > 4 * last) or size > 1e6 * scale:
+                break
+            last = size
+        return _failed(u, params, iteration, "no convergence")
+
+    def _extra_settled(self, du: Array, u: Array) -> bool:
+        e = self.parts(u)[2]
+        return bool((np.abs(self.parts(du)[2]) <= 1e-6 * (1 + np.abs(e))).all())
+
+    def _succeeded(
+        self, u: Array, params: Array, free: str, tangent: Tangent | None, direction: Array, iterations: int
+    ) -> Corrected:
+        t_u, rate = self._split(direction)
+        if tangent is None:
+            new = Tangent(t_u, 1.0, 1.0)
+        else:
+            length = math.sqrt(float(self.weights @ t_u**2) + (tangent.weight * rate) ** 2)
+            new = Tangent(t_u / length, rate / length, tangent.weight)
+        try:
+            L = ExtendedLinearisation.at(self, u, params, free)
+        except np.linalg.LinAlgError:
+            return _failed(u, params, iterations, "singular")
+        residual = float(np.max(np.abs(L.residual)))
+        if self.kind is Kind.BRANCH_POINT and abs(self.parts(u)[2][0]) > _UNFOLDED:
+            return _failed(u, params, iterations, f"no branch point: '{self.free}' unfolds it")
+        return Corrected(u, self.completed(u, params), new, residual, iterations, 0, L, math.isfinite(residual))
+
+    def _row(self, tangent: Tangent | None, n: int) -> Array:
+        """The last row in the order (u, lambda_1, lambda_2, e)."""
+        if tangent is None:
+            return self._ordered(np.zeros(n), 1.0)
+        return self._ordered(self.weights * tangent.u, tangent.parameter * tangent.weight**2)
+
+    def _ordered(self, U: Array, first: float) -> Array:
+        """(u, lambda_1, lambda_2, e) from U = (u, lambda_2, e) and lambda_1."""
+        return np.insert(U, U.size - 1 - self.extras, first)
+
+    def _split(self, x: Array) -> tuple[Array, float]:
+        """The inverse of `_ordered`."""
+        place = x.size - 2 - self.extras
+        return np.delete(x, place), float(x[place])
+
+    # ------------------------------------------------------------------ spectrum, adaption, what a user sees
+    def spectrum(self, linearisation: ExtendedLinearisation) -> Spectrum:
+        """No values; the verdict of those that are not critical."""
+        L = linearisation
+        if self.kind is Kind.FOLD:
+            self._bordered(L)
+        inner = self.inner.spectrum(L.inner)
+        others = self.others(inner.values, self.parts(L.u)[2])
+        circle = self.inner.critical.circle
+        growth = np.abs(others) - 1 if circle else others.real
+        if not np.isfinite(inner.error) or not np.isfinite(growth).all():
+            verdict = Verdict.UNDETERMINED
+        elif (growth > inner.error).any():
+            verdict = Verdict.UNSTABLE
+        else:
+            verdict = Verdict.STABLE if (growth < -inner.error).all() else Verdict.UNDETERMINED
+        return Spectrum(np.zeros(0, complex), inner.error, int((growth > 0).sum()), 0, 0, 0, verdict)
+
+    def others(self, values: NDArray[np.complex128], extra: Array) -> NDArray[np.complex128]:
+        """The values without the critical ones."""
+        critical = self.inner.critical
+        if self.kind in _PAIRS:
+            e = float(extra[0])
+            upper = e + 1j * np.sqrt(complex(1 - e * e)) if critical.circle else 1j * np.sqrt(complex(e))
+            targets = [upper, upper.conjugate() if np.imag(upper) else 1 / upper if critical.circle else -upper]
+        elif self.kind is Kind.PERIOD_DOUBLING:
+            targets = [complex(critical.minus or -1.0)]
+        else:
+            targets = [1.0 + 0j if critical.circle else 0j]
+        rest = list(values.tolist())
+        for target in targets[: len(rest)]:
+            rest.pop(int(np.argmin([abs(v - target) for v in rest])))
+        return np.array(rest, dtype=complex)
+
+    def _bordered(self, L: ExtendedLinearisation) -> None:
+        """At a fold F_u is singular: let the inner problem know the direction in which to estimate its error."""
+        self._settled(self.parts(L.u)[0], L.params, L)
+
+    def _settled(self, u: Array, params: Array, L: ExtendedLinearisation) -> Array:
+        null = np.real(L.inner.lift(np.real(L.found.right[:, 0])))
+        size = math.sqrt(float(self.inner.weights @ null**2))
+        if not (math.isfinite(size) and size > 0):
+            return u
+        found = self.inner.correct(u, params, self.along, Tangent(null / size, 0.0, 1.0), 0.0, 1e-6)
+        return found.u if found.converged else u
+
+    def adapt(self, u: Array, params: Array, tangent: Tangent) -> tuple[Locus, Array, Tangent] | None:
+        """The inner problem's better mesh or scales, and a scale that follows lambda_2."""
+        x, second, extra = self.parts(u)
+        t, t_second, t_extra = self.parts(tangent.u)
+        params = self.completed(u, params)
+        better = None
+        if self.kind is not Kind.BRANCH_POINT:
+            if self.kind is Kind.FOLD:
+                L = self.linearise(u, params)
+                x = self._settled(x, params, L)
+            better = self.inner.adapt(x, params, Tangent(t, tangent.parameter, tangent.weight))
+        scale = self.scale
+        if not 0.25 * scale < abs(second) < 2 * scale:
+            scale = max(abs(second), self.least)
+        if better is None and scale == self.scale:
+            return None
+        inner, x, t = (self.inner, x, t) if better is None else (better[0], better[1], better[2].u)
+        new = dataclasses.replace(self, inner=inner, scale=scale, born=None)
+        direction = np.concatenate([t, [t_second], t_extra])
+        length = math.sqrt(float(new.weights @ direction**2) + (tangent.parameter * tangent.weight) ** 2)
+        moved = Tangent(direction / length, tangent.parameter / length, tangent.weight)
+        return new, np.concatenate([x, [second], extra]), moved
+
+    def measures(self, u: Array, params: Array) -> dict[str, float]:
+        """lambda_2, ``torus_angle`` (NS, radians) or ``hopf_frequency``, then the inner problem's columns."""
+        x, second, extra = self.parts(u)
+        own = {self.free: second}
+        if self.kind is Kind.NEIMARK_SACKER:
+            own["torus_angle"] = math.acos(min(1.0, max(-1.0, float(extra[0]))))
+        if self.kind is Kind.HOPF:
+            own["hopf_frequency"] = math.sqrt(max(0.0, float(extra[0])))
+        return {**own, **self.inner.measures(x, self.completed(u, params))}
+
+    def error(self, u: Array, params: Array) -> float:
+        """That of the inner solution."""
+        return float(self.inner.error(self._solution(u, params), self.completed(u, params)))
+
+    def view(self, u: Array, params: Array) -> Any:
+        """The inner solution."""
+        return self.inner.view(self._solution(u, params), self.completed(u, params))
+
+    def _solution(self, u: Array, params: Array) -> Array:
+        x = self.parts(u)[0]
+        if self.kind is not Kind.FOLD:
+            return x
+        return self._settled(x, self.completed(u, params), self.linearise(u, params))
+
+
+def _failed(u: Array, params: Array, iterations: int, note: str) -> Corrected:
+    return Corrected(u, params, None, math.inf, iterations, 0, None, False, note)
+
+
+def locus(point: SpecialPoint, *, free: str, along: str | None = None) -> Locus:
+    """The curve of special points like `point` in two parameters; give it to `continuation`.
+
+    F(u, lambda_1, lambda_2) = 0 together with the condition of the point's kind: multiplier +1 (fold, branch point),
+    -1 (period doubling), exp(+-i theta) (Neimark-Sacker), eigenvalue 0 (fold) or +-i omega (Hopf).
+
+    Parameters
+    ----------
+    point : SpecialPoint
+        A fold, Hopf, period-doubling, Neimark-Sacker or branch point of a branch, also of a loaded one.
+    free : str
+        The second parameter, which becomes an unknown; its values are the column of that name.
+    along : str or None
+        The parameter that `continuation` will follow; by default the one of the branch on which the point was found.
+
+    Returns
+    -------
+    Locus
+        For ``continuation(locus(point, free="xi"), "Omega", (lo, hi))``: both sides of the point, joined. Columns:
+        both parameters, ``torus_angle`` or ``hopf_frequency``, and the solution's. The verdict of a point tells whether
+        the values that are not critical are inside: STABLE where the curve is a border of stability.
+
+    Raises
+    ------
+    InputError
+        The kind has no curve, the two parameters are one, or a branch point that the second parameter breaks up.
+    UnknownNameError
+        No such parameter.
+    ConvergenceError
+        The defining system is singular at the point (itself a point of higher codimension).
+
+    Examples
+    --------
+    >>> import stability as st
+    >>> branch = st.continuation(st.Equilibrium(st.models.lorenz()), "rho", (15, 30), start=dict(x=6, y=6, z=14))
+    >>> curve = st.continuation(st.locus(branch["HB1"], free="sigma"), "rho", (20, 30))
+    >>> s, b, rho = curve.columns["sigma"], 8 / 3, curve.columns["rho"]
+    >>> float(abs(rho - s * (s + b + 3) / (s - b - 1)).max()) < 1e-9
+    True
+    """
+    if not isinstance(point, SpecialPoint):
+        raise InputError(f"locus needs a special point such as branch['PD1'], got {type(point).__name__}")
+    if point.kind not in _KINDS:
+        known = ", ".join(str(kind) for kind in _KINDS)
+        raise InputError(f"{point.label} is a {point.kind} point: curves exist for {known} points")
+    problem, along = point.problem, point.free if along is None else along
+    names = list(problem.parameters)
+    for name in (free, along):
+        if name not in names:
+            raise unknown_name("parameter", name, names, "this problem")
+    if free == along:
+        raise InputError(
+            f"'{free}' is the parameter of the branch itself: name another one, or say along='...' which to follow"
+        )
+    return _born(problem, point, free, along)
+
+
+def _born(problem: Problem, point: SpecialPoint, free: str, along: str) -> Locus:
+    params = point.params_vector
+    second = point.params[free]
+    extra = first_extra(point.kind, problem.critical, point.multipliers)
+    scale = abs(second) or 1.0
+    curve = Locus(problem, point.kind, free, along, scale, _SMALLEST_SCALE * scale)
+    U = np.concatenate([point.u, [second], extra])
+    try:
+        L = ExtendedLinearisation.at(curve, U, params, along)
+        direction = _direction(curve, L)
+    except np.linalg.LinAlgError:
+        direction = None
+    if direction is None:
+        raise ConvergenceError(
+            f"the curve through {point.label} has no direction there: a point of higher codimension; begin beside it",
+            last=point.u,
+        )
+    if point.kind is Kind.BRANCH_POINT and abs(direction[0][-1]) > 1e-5 * _size(curve, direction[0]):
+        raise InputError(
+            f"{point.label} is a crossing that '{free}' breaks up: no branch points beside it. Follow the folds near "
+            f"it, or a parameter that keeps the symmetry or the trivial solution which makes it"
+        )
+    return dataclasses.replace(curve, born=(U, params, *direction))
+
+
+def _size(curve: Locus, direction: Array) -> float:
+    return math.sqrt(float(curve.weights @ direction**2)) or 1.0
+
+
+def _direction(curve: Locus, L: ExtendedLinearisation) -> tuple[Array, float] | None:
+    """The null vector of the extended linearisation: a border of random direction, then the result itself."""
+    n = L.u.size
+    w = np.insert(curve.weights, n - 1 - curve.extras, 1.0)
+    row = np.random.default_rng(0).standard_normal(n + 1) * np.sqrt(w)
+    right = np.zeros((n + 1, 1))
+    right[n] = 1.0
+    for _ in range(3):
+        t = L.solve_bordered(row, right)[:, 0]
+        length = math.sqrt(float(w @ t**2)) if np.isfinite(t).all() else math.nan
+        if not (math.isfinite(length) and length > 0):
+            return None
+        row = w * t / length
+    return curve._split(t / length)

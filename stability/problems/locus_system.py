@@ -1,0 +1,122 @@
+r"""The extended system whose zeros are a curve of special points in two parameters, and its bordered Newton step.
+
+With the conditions g(u, p, e) (q,) of `defining` (q = 1 + number of extra unknowns e: mu, omega^2 or cos theta),
+
+    F(u, p) + e b = 0,     g(u, p, e) = 0        unknowns U = (u, lambda_2, e) and lambda_1,
+
+where e b stands for the unfolding of a branch point only. One Newton step is one bordered solve of the inner problem:
+
+    [ F_u   F_1    F_2    b   ] [ du  ]     [ -F - e b ]
+    [ g_u   g_1    g_2    g_e ] [ dl1 ]  =  [ -g       ]
+    [ t_u   t_1    t_2    0   ] [ dl2 ]     [ rest     ]
+                                [ de  ]
+
+The borders of g are taken anew from the singular vectors at every iterate: g changes by a regular factor, its zeros do
+not, and no border can become orthogonal to what it has to complete. Reference: Kuznetsov (2004), 10.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..protocols import Linearisation
+from ..words import Kind
+from .defining import Equations, equations, frame_of
+
+if TYPE_CHECKING:
+    from .locus import Locus
+
+__all__ = ["ExtendedLinearisation"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedLinearisation:
+    """The inner linearisation at (u, p) and the conditions with their gradients; `names` = (lambda_1, lambda_2).
+
+    Attributes
+    ----------
+    inner : Linearisation of the inner problem
+    found : Equations, the conditions g and their gradients
+    columns : (N, 2 + e), derivatives of the inner equations by lambda_1, lambda_2 and the extra unknowns
+    """
+
+    problem: Locus
+    u: Array
+    params: Array
+    inner: Linearisation
+    found: Equations
+    columns: Array
+    names: tuple[str, str]
+
+    @classmethod
+    def at(cls, problem: Locus, U: Array, params: Array, first: str) -> ExtendedLinearisation:
+        """At any point; `params` holds lambda_1, lambda_2 is taken from U.
+
+        Raises
+        ------
+        LinAlgError
+            The linearisation is not finite, or the conditions are not regular.
+        """
+        inner, free = problem.inner, problem.free
+        u, extra = problem.parts(U)[0], problem.parts(U)[2]
+        params = problem.completed(U, params)
+        L = inner.linearise(u, params)
+        frame = frame_of(problem.kind, L, inner.critical, problem.along, extra)
+        found = equations(problem.kind, L, inner.critical, problem.along, extra, frame)
+        if found.g.size != 1 + extra.size:
+            raise np.linalg.LinAlgError("a pair needs two states at least")
+        columns = np.zeros((u.size, 2 + extra.size))
+        columns[:, 0], columns[:, 1] = L.column(first), L.column(free)
+        if problem.kind is Kind.BRANCH_POINT:
+            columns[:, 2] = L.embed(np.real(frame.left[:, 0]))
+        return cls(problem, U, params, L, found, columns, (first, free))
+
+    @property
+    def residual(self) -> Array:
+        """(N + q,): inner equations, then conditions."""
+        F = np.array(self.inner.residual)
+        if self.problem.kind is Kind.BRANCH_POINT:
+            F = F + self.problem.parts(self.u)[2][0] * self.columns[:, 2]
+        return np.concatenate([F, self.found.g])
+
+    def column(self, name: str) -> Array:
+        """(N + q,): derivative by any parameter but lambda_2."""
+        k = list(self.problem.parameters).index(name)
+        return np.concatenate([self.inner.column(name), self.found.by_params[:, k]])
+
+    def solve_bordered(self, row: Array, right_sides: Array) -> Array:
+        """Solve with the last row `row` = (u, lambda_1, lambda_2, e) given; right sides (N + q + 1, r)."""
+        names = list(self.problem.parameters)
+        by_params = self.found.by_params[:, [names.index(name) for name in self.names]]
+        n, q = self.found.by_u.shape[1], self.found.g.size
+        rows = np.concatenate([self.found.by_u, row[None, :n]])
+        corner = np.zeros((q + 1, 2 + self.found.by_extra.shape[1]))
+        corner[:q] = np.column_stack([by_params, self.found.by_extra])
+        corner[q] = row[n:]
+        return np.asarray(self.inner.solve(rows, self.columns, corner, right_sides))
+
+    @property
+    def core(self) -> Array:
+        """Not available: special points of the curve are found along it, not from a defining system.
+
+        Raises
+        ------
+        LinAlgError
+            Always (its gradient would need third derivatives of the inner problem).
+        """
+        raise np.linalg.LinAlgError("curves of special points have no defining system of their own")
+
+    @property
+    def spectral(self) -> Array:
+        """That of the inner problem."""
+        return self.inner.spectral
+
+    def core_column(self, name: str) -> Any:
+        """Not available, see `core`."""
+        return self.core
