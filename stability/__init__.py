@@ -24,6 +24,7 @@ _EXPORTS: dict[str, str] = {
     "Branch": "results.branch",
     "Collocation": "problems.collocation",
     "Shooting": "problems.shooting",
+    "Backbone": "problems.backbone",
     "HarmonicBalance": "problems.harmonic_balance",
     "chart": "charting.charts",
     "StabilityChart": "results.chart",
