@@ -145,6 +145,7 @@ def assemble(
         "ds": settings.steps.first,
         "ds_max": settings.steps.longest,
         "scale": 1.0 / settings.weight,
+        "state_scales": np.asarray(getattr(first.problem, "scales", ())).tolist(),
         "circle": first.problem.critical.circle,
         "at": list(settings.at),
         "resume": [_resume_data(f) for f in ends],

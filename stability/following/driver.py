@@ -242,7 +242,7 @@ def _end_at_birth(follower: Follower, birth: Point) -> None:
     for k in range(len(follower.entries) - 1, 0, -1):
         point, found = follower.entries[k]
         again = found is not None and found.kind in (Kind.BRANCH_POINT, Kind.FOLD)
-        if again and abs(point.parameter - birth.parameter) * birth.tangent.weight < 1e-7:
+        if again and abs(point.parameter - birth.parameter) * birth.tangent.weight < 1e-5:
             follower.entries[k:] = [Entry(point, None)]
             return
 

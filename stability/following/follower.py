@@ -183,22 +183,24 @@ class Follower(Iterator[Point]):
     # ------------------------------------------------------------------ after a step
     def _take(self, point: Point, seen: Comparison, found: list[Found]) -> None:
         settings, last = self.settings, self.last
-        closed = self.home.reached(last, point, self.locator, self.accepted)
-        if closed is not None:
-            point = closed
-            found = [f for f in found if f.point.s <= closed.s]
+        back = self.home.reached(last, point, self.locator, self.accepted)
+        if back is not None:
+            point = back[0]
+            found = [f for f in found if f.point.s <= point.s]
         found = self._with_wanted(last, point, found)
         if self._stops(found):
             return
         at_point = self._value_at(point)
         self.entries.append(Entry(point, at_point))
         self.accepted += 1
+        self.home.remember(self.accepted, point)
         self._rate = max(self._rate, float(np.abs(point.spectrum.values).max(initial=0.0)))
         self.length = next_length(seen.distance, seen, last, point, settings.steps)
         if at_point is not None and self._named_stop(at_point):
             self.status = Status.STOPPED
-        elif closed is not None:
-            self.status = Status.CLOSED_LOOP
+        elif back is not None:
+            self._close(back[1])
+            return
         elif point.parameter in settings.window:
             self.status = Status.PARAMETER_BOUND
         elif self._runaway(point):
@@ -207,6 +209,15 @@ class Follower(Iterator[Point]):
         self.since_adapt += 1
         if self.since_adapt >= _ADAPT_EVERY and self.status is None:
             self._adapt()
+
+    def _close(self, loop: float) -> None:
+        """End the branch where it began: what was followed a second time is dropped, the first point closes it."""
+        self.status = Status.CLOSED_LOOP
+        first = self.home.marks[0][1]
+        end = first.s + loop
+        self.entries = [e for e in self.entries if e.point.s < end - 1e-9]
+        self.entries.append(Entry(first._replace(s=end), None))
+        self.last = first
 
     def _value_at(self, point: Point) -> Found | None:
         if point.parameter not in self.settings.at:

@@ -1,83 +1,57 @@
-r"""Recognising a closed branch: has the curve come back to where it started, in the same direction?
+r"""Recognising a closed branch: has the curve come back to where it was, in the same direction?
 
-A segment that passes close to the first point is a candidate; it is closed if the point of the branch nearest to the
-first one *is* the first one, to the accuracy of the corrector. On another mesh the first solution is carried over (as a
-start for the current problem) before it is compared.
+The first points of a branch are remembered, a few of them, so that one is away from folds. When the parameter passes
+the value of one of them again in the same direction, the solution there is computed and compared by its measures
+(extrema, amplitudes, period): they do not depend on the mesh, nor on the phase of an autonomous orbit.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from ..errors import ConvergenceError, InputError
 from ..results.solutions import PeriodicOrbit
-from .locating import Locator, chord_length
-from .points import Point, dot, make_point
+from .locating import Locator
+from .points import Point
 
 __all__ = ["Home", "collapsed"]
 
-_SAME = 1e-6
+_SAME, _NOTHING = 1e-5, 1e-8
+_REMEMBERED = (0, 3, 7, 12)
 _FEWEST = 4
 # a mesh that is not the same in both halves breaks the symmetry by its error e, the crossing by about e^(1/3)
 _COLLAPSED = 2e-2
 
 
 class Home:
-    """The first point of a branch, to be recognised when the curve returns."""
+    """Points at the beginning of a branch, to be recognised when the curve returns."""
 
     def __init__(self, first: Point) -> None:
-        self.first = first
+        self.marks: list[tuple[int, Point]] = [(0, first)]
 
-    def reached(self, a: Point, b: Point, locator: Locator, accepted: int) -> Point | None:
-        """The closing point, equal to the first one, if the segment from a to b passes through it."""
-        if accepted < _FEWEST:
-            return None
-        if a.problem is self.first.problem:
-            return self._on_same_mesh(a, b, locator)
-        return self._by_parameter(a, b, locator)
+    def remember(self, accepted: int, point: Point) -> None:
+        """Keep the point if it is one of the first."""
+        if accepted in _REMEMBERED:
+            self.marks.append((accepted, point))
 
-    def _on_same_mesh(self, a: Point, b: Point, locator: Locator) -> Point | None:
-        home, w, weight = self.first, a.problem.weights, a.tangent.weight
-        du, dl = home.u - a.u, (home.parameter - a.parameter) * weight
-        length = chord_length(a, b)
-        along = dot(w, a.tangent.u, du) + a.tangent.parameter * weight * dl
-        across = dot(w, du, du) + dl * dl - along * along
-        if not 0 < along <= 1.1 * length or across > (0.3 * length) ** 2:
-            return None
-        found = a.problem.correct(a.u, a.params, locator.free, a.tangent, along, locator.tolerance)
-        if not found.converged or found.tangent is None:
-            return None
-        if dot(w, found.tangent.u, home.tangent.u) + found.tangent.parameter * home.tangent.parameter * weight**2 <= 0:
-            return None
-        point = make_point(a.problem, found, found.tangent, locator.k, a.s + along, along)
-        return point if self._same(point, home) else None
+    def reached(self, a: Point, b: Point, locator: Locator, accepted: int) -> tuple[Point, float] | None:
+        """(the point again, arclength of the whole loop) if the segment from a to b passes a remembered point."""
+        for number, mark in self.marks:
+            passed = (a.parameter - mark.parameter) * (b.parameter - mark.parameter) < 0
+            same_way = b.tangent.parameter * mark.tangent.parameter > 0
+            if accepted < number + _FEWEST or not (passed and same_way):
+                continue
+            point = locator.at_parameter(a, b, mark.parameter)
+            if point is not None and _same(point, mark):
+                return point, point.s - mark.s
+        return None
 
-    def _by_parameter(self, a: Point, b: Point, locator: Locator) -> Point | None:
-        home = self.first
-        if not (a.parameter - home.parameter) * (b.parameter - home.parameter) < 0:
-            return None
-        if b.tangent.parameter * home.tangent.parameter < 0:
-            return None
-        point = locator.at_parameter(a, b, home.parameter)
-        if point is None:
-            return None
-        try:
-            u = a.problem.start(home.params, home.problem.view(home.u, home.params))
-        except (ConvergenceError, InputError):
-            return None
-        found = a.problem.correct(u, point.params, locator.free, None, 0.0, locator.tolerance)
-        if not found.converged:
-            return None
-        return point if self._same(point, point._replace(u=found.u)) else None
 
-    @staticmethod
-    def _same(p: Point, q: Point) -> bool:
-        w = p.problem.weights
-        du = p.u - q.u
-        size = 1 + math.sqrt(dot(w, p.u, p.u))
-        return math.sqrt(dot(w, du, du)) + abs(p.parameter - q.parameter) * p.tangent.weight < _SAME * size
+def _same(p: Point, q: Point) -> bool:
+    one, other = p.problem.measures(p.u, p.params), q.problem.measures(q.u, q.params)
+    floor = _NOTHING * max(abs(v) for v in other.values())
+    return one.keys() == other.keys() and all(
+        abs(one[k] - v) <= _SAME * max(abs(v), abs(one[k])) + floor for k, v in other.items()
+    )
 
 
 def collapsed(point: Point) -> bool:
