@@ -101,6 +101,28 @@ def _multisection(
     return lower, upper
 
 
+def _right_index(
+    diagonal: Array,
+    squares: Array,
+    index: NDArray[np.int64],
+    lower: Array,
+    upper: Array,
+    x: Array,
+    at: NDArray[np.intp],
+    scale: Array,
+) -> NDArray[np.bool_]:
+    """Whether x[at] is the eigenvalue asked for; where not, its bracket is cut and x set to the middle of it."""
+    reach = 4.0 * _NOISE * _EPS * scale[at]
+    sides = np.stack([x[at] - reach, x[at] + reach])
+    below, above = sturm_count(diagonal[:, at], squares[:, at], sides)
+    too_low, too_high = above <= index[at], below > index[at]
+    lower[at] = np.where(too_low, np.maximum(lower[at], sides[1]), lower[at])
+    upper[at] = np.where(too_high, np.minimum(upper[at], sides[0]), upper[at])
+    wrong = too_low | too_high
+    x[at] = np.where(wrong, 0.5 * (lower[at] + upper[at]), x[at])
+    return ~wrong
+
+
 def indexed_eigenvalues(
     diagonal: Array, squares: Array, index: NDArray[np.int64], lower: Array, upper: Array, scale: Array
 ) -> Array:
@@ -142,7 +164,11 @@ def indexed_eigenvalues(
         # a step that leaves the bracket by no more than roundings is at the eigenvalue; any other is not for it
         outside = (move < lo - tolerance) | (move > hi + tolerance) | ~np.isfinite(move)
         x[active] = np.where(outside, 0.5 * (lo + hi), move)
-        done = (~outside & (np.abs(step) <= tolerance)) | (hi - lo <= 0.25 * tolerance)
+        settled = ~outside & (np.abs(step) <= tolerance)
+        if settled.any():
+            # Newton may have found a neighbour in the same bracket: counts on both sides of the value tell its index
+            settled[settled] = _right_index(diagonal, squares, index, lower, upper, x, active[settled], scale)
+        done = settled | (hi - lo <= 0.25 * tolerance)
         active = active[~done]
         if active.size == 0:
             break

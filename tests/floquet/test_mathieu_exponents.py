@@ -8,7 +8,7 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as some
 
 from stability.errors import ConvergenceError, InputError
@@ -59,6 +59,7 @@ def test_perturbation_series() -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(some.floats(0.0, 60.0), some.floats(-300.0, 300.0))
+@example(5.00390625, 1.0)
 def test_inverse(nu: float, q: float) -> None:
     """nu -> a -> nu; compared in a, where the problem is well conditioned (thin bands are not resolved in nu)."""
     a = mathieu_a_of_exponent(nu, q)
@@ -69,6 +70,14 @@ def test_inverse(nu: float, q: float) -> None:
     assert abs(again.real - nu) <= at_edge + 1.0 * (abs(q) > 2 * nu**2)
     if again.imag == 0:
         assert abs(mathieu_a_of_exponent(again.real, q) - a) <= 4e-15 * max(scale, nu * nu)
+
+
+def test_neighbours_in_a_narrow_gap_are_not_confused() -> None:
+    """nu = 5 + d and 5 - d are two eigenvalues of one matrix, close for small d: the index decides which is which."""
+    for nu in (5.00390625, 4.99609375, 5.0001, 4.9999, 7.00001):
+        for q in (0.0, 0.5, 1.0, 2.0):
+            a = mathieu_a_of_exponent(nu, q)
+            assert abs(mathieu_exponent(a, q) - nu) < 1e-9, (nu, q)
 
 
 def test_integer_order_is_the_upper_edge() -> None:
