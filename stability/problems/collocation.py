@@ -30,10 +30,11 @@ from ..kernels import condensation_newton as kernels
 from ..kernels.condensation_reduced import monodromy_product
 from ..kernels.meshes import uniform_edges
 from ..protocols import Corrected, Spectrum, Tangent
+from .collocation_error import multiplier_error, node_error
 from .collocation_linearisation import CollocationLinearisation, Workspace
 from .orbit_adaption import adapted
 from .orbit_mesh import OrbitMesh
-from .orbit_spectrum import contracted, deflated, eigenvalues, orbit_spectrum, spectrum_distance
+from .orbit_spectrum import contracted, deflated, eigenvalues, orbit_spectrum
 from .orbit_starts import doubled_problem
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
 
@@ -51,10 +52,6 @@ def _plain(array: Array) -> Array:
     if flags.writeable and flags.c_contiguous and array.dtype == np.float64:
         return array
     return np.array(array, float, order="C")
-
-
-def _same(a: Array, b: Array) -> bool:
-    return a is b or np.array_equal(a, b)
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +183,7 @@ class Collocation(OrbitDiscretisation):
         mesh = self.mesh.dense
         nodes, stages, rest = self.mesh.split(u)
         stages = self.mesh.resample(mesh, nodes, stages)
-        work, stage, sign = self._condensed(mesh, nodes, stages, rest, params, True)
+        _, stage, sign = self._condensed(mesh, nodes, stages, rest, params, True)
         if sign != 0.0:
             stages = stages - stage
         values, edges = mesh.polynomial(nodes, stages), mesh.edges
@@ -202,7 +199,7 @@ class Collocation(OrbitDiscretisation):
         return self.mesh.quadrature(self.scales)
 
     @cached_property
-    def _raised_weights(self) -> Array:
+    def raised_weights(self) -> Array:
         """`weights` on the mesh of degree m + 1."""
         higher = self.mesh.raised
         nodes = np.zeros((higher.intervals + 1, higher.n))
@@ -247,19 +244,20 @@ class Collocation(OrbitDiscretisation):
         self, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
     ) -> Corrected:
         """The bordered Newton solve of `protocols.Problem`, in one compiled call."""
-        return self._newton(self.mesh, u, params, self.index(free), tangent, ds, tolerance, None)
+        return self.newton(self.mesh, u, params, self.index(free), tangent, ds, tolerance, None)
 
-    def _newton(
+    def newton(
         self, mesh: OrbitMesh, u: Array, params: Array, index: int, tangent: Tangent | None, ds: float,
         tolerance: float, limit: int | None,
     ) -> Corrected:  # fmt: skip
+        """`correct` on any mesh, at most `limit` iterations; its linearisation is a bare Workspace off the own mesh."""
         u, params = np.array(u, float), np.array(params, float)
         nodes, stages, _ = mesh.split(u)
         work = Workspace(mesh, len(params), len(self.kept))
         arc, t, t_l, weight = 0, u, 0.0, 0.0
         if tangent is not None:
             arc, t, t_l, weight = 1, _plain(tangent.u), float(tangent.parameter), float(tangent.weight)
-        weights = self.weights if mesh is self.mesh else self._raised_weights
+        weights = self.weights if mesh is self.mesh else self.raised_weights
         rule = mesh.rule
         status, iterations, residual, sign, x = kernels.newton(
             self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.matrix,
@@ -336,40 +334,9 @@ class Collocation(OrbitDiscretisation):
         return doubled_problem(self, u, params, vector)
 
     # ------------------------------------------------------------------ spectrum and error
-    def refined(self, u: Array, params: Array) -> tuple[Array, Array, Workspace] | None:
-        """(change of u's nodes, corrected u at degree m + 1, its arrays) of one Newton step; None if it failed."""
-        known = self._memo.get("refined")
-        if known is not None and _same(known[0], u) and _same(known[1], params):
-            found_before: tuple[Array, Array, Workspace] | None = known[2]
-            return found_before
-        mesh = self.mesh
-        nodes, stages, rest = mesh.split(u)
-        higher = mesh.raised
-        start = higher.join(nodes, mesh.resample(higher, nodes, stages), rest)
-        index, tangent = 0, None
-        at = self._memo.get("tangent")
-        if at is not None and _same(at[0], u):
-            index, t = at[1], at[2]
-            t_nodes, t_stages, t_rest = mesh.split(t.u)
-            t_stages = mesh.resample(higher, t_nodes, t_stages)
-            tangent = Tangent(higher.join(t_nodes, t_stages, t_rest), t.parameter, t.weight)
-        found = self._newton(higher, start, params, index, tangent, 0.0, np.inf, 1)
-        result: Any = None
-        if found.converged:
-            change = higher.split(found.u)[0] - nodes
-            result = (change, found.u, found.linearisation)
-        self._memo["refined"] = (u, params, result)
-        return result
-
     def error(self, u: Array, params: Array) -> float:
         """Largest error of the nodes and of the period over their scales, by degree m + 1; inf: unknown."""
-        refined = self.refined(u, params)
-        if refined is None:
-            return np.inf
-        worst = float(np.abs(refined[0] / self.scales).max())
-        if self.mesh.own:
-            worst = max(worst, abs(float(refined[1][-1] - u[-1])) / float(u[-1]))
-        return worst
+        return node_error(self, u, params)
 
     def spectrum(self, linearisation: Any) -> Spectrum:
         """Multipliers, their error (by degree m + 1, and the trivial multiplier's distance from 1), counts, verdict."""
@@ -380,36 +347,10 @@ class Collocation(OrbitDiscretisation):
             direction = self._direction_of_flow(linearisation)
             M, error = deflated(M, direction)
         values = eigenvalues(M)
-        error += self._multiplier_error(linearisation, values, direction if self.mesh.own else None)
+        error += multiplier_error(self, linearisation, values, direction if self.mesh.own else None)
         error += 1e-15 * float(np.abs(M).max()) * len(M)
         values = contracted(values, linearisation.work.M) if not self.halved else values
         return orbit_spectrum(values, error, self._area_preserving(linearisation))
-
-    def _multiplier_error(
-        self, linearisation: CollocationLinearisation, values: Array, direction: Array | None
-    ) -> float:
-        """Change of the multipliers near the unit circle from degree m to m + 1.
-
-        Where no multiplier is near the circle, the change at an earlier point of the same mesh is carried over, times
-        3 and the square of the growth of the m-th derivative (up to 2): nodes have twice the order of the polynomial.
-        """
-        mesh = self.mesh
-        nodes, stages, _ = mesh.split(linearisation.solution)
-        size = float(np.abs(mesh.leading(nodes, stages) / self.scales).max())
-        known = self._memo.get("level")
-        if known is not None and 0 < size < 2 * known[1]:
-            carried = 3 * known[0] * max(1.0, size / known[1]) ** 2
-            if float(np.abs(np.abs(values) - 1).min(initial=1.0)) > 1e3 * carried + 1e-5:
-                return float(carried)
-        refined = self.refined(linearisation.solution, linearisation.solution_params)
-        if refined is None:
-            return math.inf
-        other = self.spectral_of(refined[2].M)
-        if direction is not None:
-            other = deflated(other, direction)[0]
-        error = spectrum_distance(values, eigenvalues(other))
-        self._memo["level"] = (max(error, 1e-15), size)
-        return error
 
     def _area_preserving(self, linearisation: CollocationLinearisation) -> bool:
         """Whether a forced system of two states has no divergence, hence det M = 1."""

@@ -365,6 +365,7 @@ def test_folds_of_the_closed_duffing_peak(window):
     assert abs(found[1] - 1.380933030) < 2e-9 and abs(found[0] - 1.088436639) < 2e-9
     for point in branch.special:
         assert min(abs(point.multipliers - 1)) < 1e-7
+        assert point.solution.error < 1e-8  # also where the linearisation at fixed Omega is singular
 
 
 def test_the_open_resonance_has_its_fold_on_the_detached_family():
