@@ -7,7 +7,7 @@ excitation does not.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -68,19 +68,30 @@ def averaged_equilibrium(system: System, mean: sp.Matrix, start: npt.NDArray[np.
     numeric = mean.subs(own)
     jacobian = sp.Matrix([[differentiate(e, s) for s in states] for e in numeric])
     f, df = sp.lambdify([states], numeric, "numpy"), sp.lambdify([states], jacobian, "numpy")
-    x = start.copy()
-    for iteration in range(60):
-        residual = np.asarray(f(x), dtype=float).ravel()
-        if not np.isfinite(residual).all():
-            break
-        try:
-            step = np.linalg.solve(np.asarray(df(x), dtype=float), -residual)
-        except np.linalg.LinAlgError:
-            break
-        x = x + step
-        if np.abs(step).max() <= 1e-14 * max(1.0, float(np.abs(x).max())) or (iteration > 40 and not step.any()):
+    starts = [start] if start.any() else [start, start - 1e-9, start + 1e-9]  # zero may be a kink of the spring
+    for first in starts:
+        found, x = _newton(f, df, first)
+        if found:
             return {s: float(v) if abs(v) > 1e-300 else 0.0 for s, v in zip(system.states, x)}
     raise ConvergenceError(
         f"no equilibrium of '{system.name}' from {dict(zip(system.states, start.tolist()))}; give another about=",
-        last=x, iterations=iteration + 1,
+        last=x,
     )  # fmt: skip
+
+
+def _newton(f: Any, df: Any, start: npt.NDArray[np.float64]) -> tuple[bool, npt.NDArray[np.float64]]:
+    """(whether it converged, the last iterate) of Newton's method."""
+    x = start.copy()
+    for _ in range(60):
+        residual = np.asarray(f(x), dtype=float).ravel()
+        matrix = np.asarray(df(x), dtype=float)
+        if not (np.isfinite(residual).all() and np.isfinite(matrix).all()):
+            return False, x
+        try:
+            step = np.linalg.solve(matrix, -residual)
+        except np.linalg.LinAlgError:
+            return False, x
+        x = x + step
+        if np.abs(step).max() <= 1e-14 * max(1.0, float(np.abs(x).max())):
+            return True, x
+    return False, x

@@ -156,7 +156,8 @@ def from_acceleration(
         xi1=xi1, xi2=xi2, mass_ratio_total=mass_ratio_total, acceleration=acceleration, Omega0=Omega0, Omega=Omega
     )
     return _dimensionless(
-        W**2 / (acc * W0**2), values, base_term, dict(acceleration=(0, float("inf"))), dict(acceleration=2),
+        W**2 / (acc * W0**2), values, base_term, dict(acceleration=(0, float("inf")), Omega0=_POSITIVE),
+        dict(acceleration=2),
         description="mass on a spring that carries a pendulum, at constant base acceleration (g)",
     )  # fmt: skip
 

@@ -145,7 +145,7 @@ def _ranges(values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
     """Masses, lengths and gaps are positive, dampers and resistances not negative, also after `with_params`."""
     limits = {}
     for name in values:
-        if name.startswith(("mass", "length", "gap")):
+        if name.startswith(("mass", "length", "gap", "inductance")):
             limits[name] = (1e-300, math.inf)
         elif "damping" in name or "resistance" in name:
             limits[name] = (0.0, math.inf)

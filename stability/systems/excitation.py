@@ -99,8 +99,8 @@ class ConstantAmplitude(Excitation):
     amplitude: float
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.amplitude):
-            raise InputError(f"amplitude must be finite; got {self.amplitude}")
+        if not (math.isfinite(self.amplitude) and self.amplitude >= 0):
+            raise InputError(f"amplitude must be finite and not negative; got {self.amplitude}")
 
     @property
     def _target(self) -> tuple[str, float, str]:
@@ -126,8 +126,8 @@ class ConstantAcceleration(Excitation):
     acceleration: float
 
     def __post_init__(self) -> None:
-        if not math.isfinite(self.acceleration):
-            raise InputError(f"acceleration must be finite; got {self.acceleration}")
+        if not (math.isfinite(self.acceleration) and self.acceleration >= 0):
+            raise InputError(f"acceleration must be finite and not negative; got {self.acceleration}")
 
     @property
     def _target(self) -> tuple[str, float, str]:

@@ -216,3 +216,10 @@ def test_plot_takes_axes():
     assert {line.axes for line in lines} == set(axes) and len(lines) == 4
     assert lines[0].get_ydata() == pytest.approx(np.abs(response.frequency_response(np.linspace(0.1, 2, 50), "u")))
     plt.close(figure)
+
+
+def test_rest_of_a_spring_with_its_kink_at_zero():
+    response = st.linear_response(st.models.unilateral_spring.from_physical())
+    y = response.equilibrium["y"]
+    assert 315.827 * y + 1.9e7 * y**3 == pytest.approx(-0.02 * 9.81, rel=1e-12)
+    assert response.natural_frequencies[0] ** 2 == pytest.approx((315.827 + 3 * 1.9e7 * y**2) / 0.02, rel=1e-3)
