@@ -3,8 +3,8 @@
 A motion over [t0, t1] is cut at the jumps of the right-hand side in time; each piece is one call of
 kernels/runge_kutta.py (order 8, error control per step, dense output of order 7), or, where the system has stops,
 switches or user events, a chain of such calls from event to event (integration/events.py). The compiled calls release
-the GIL, so that threads run motions side by side. A motion that cannot go on has an `Ending` that says so and everything
-up to its last good point; only a Python function that raises is an error.
+the GIL, so that threads run motions side by side. A motion that cannot go on has an `Ending` that says so and
+everything up to its last good point; only a Python function that raises is an error.
 """
 
 from __future__ import annotations
@@ -97,7 +97,7 @@ class Engine:
 
     @classmethod
     def of(cls, system: Any, events: Mapping[str, Any] | None = None, stopping: Sequence[str] = ()) -> Engine:
-        """The engine of a system, with events by name (expressions or their text); `stopping` names those that end it."""
+        """The engine of a system, with events by name (expressions or their text); `stopping`: those that end it."""
         return _engine(system, tuple((events or {}).items()), tuple(stopping))
 
     @property
@@ -125,7 +125,8 @@ class Engine:
         """
         n = len(x0)
         which = np.array([-1] * (n if variations else 0) + [self.compiled.place(p) for p in parameters], np.int64)
-        rates, start_columns = self._rates(params, which), np.eye(n, len(which)) if variations else np.zeros((n, len(which)))
+        rates = self._rates(params, which)
+        start_columns = np.eye(n, len(which)) if variations else np.zeros((n, len(which)))
         intervals = self.cuts(params, t0, t1)
         if self.guards is not None:
             chain, ending = follow_events(

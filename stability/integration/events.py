@@ -1,7 +1,8 @@
 r"""Events of a system: its switches, its walls and what a user asks for, as guards of a compiled field.
 
-The smooth form of a piecewise system (integration/switches.py) has extra parameters: a mode per switch and, per hard stop,
-a hold that keeps the coordinate on the wall (q' = q'' = 0 while it is pressed against it). Guards, in this order:
+The smooth form of a piecewise system (integration/switches.py) has extra parameters: a mode per switch and, per hard
+stop, a hold that keeps the coordinate on the wall (q' = q'' = 0 while it is pressed against it). Guards, in this
+order:
 
     switch    g(t, x, p)                  sign = mode: the right-hand side changes its form where g changes sign
     wall      side (position - q) >= 0    the velocity is reversed at zero: q'+ = -e q'-
@@ -100,7 +101,8 @@ def _walls(system: Any, first: int) -> tuple[Wall, ...]:
         )  # fmt: skip
     for upper in walls:
         for lower in walls:
-            if upper.side > 0 > lower.side and upper.coordinate == lower.coordinate and upper.position <= lower.position:
+            facing = upper.side > 0 > lower.side and upper.coordinate == lower.coordinate
+            if facing and upper.position <= lower.position:
                 name = system.states[upper.coordinate]
                 raise InputError(
                     f"the stops of {name} overlap: from above at {upper.position:g}, from below at {lower.position:g}"
@@ -170,8 +172,10 @@ def guards_of(system: Any, events: Mapping[str, Any] | None = None, stopping: Se
     compiled = CompiledField.of(smooth)
     field, size = _guard_field(system, parameters, expressions)
     ends = np.array([kind == "event" and name in stopping for kind, name in zip(kinds, names)], bool)
-    return Guards(compiled, compiled.evaluations.address("F"), m, len(parameters) - m, tuple(kinds), tuple(names), walls,
-                  field, size, ends)  # fmt: skip
+    return Guards(
+        compiled, compiled.evaluations.address("F"), m, len(parameters) - m, tuple(kinds), tuple(names), walls, field,
+        size, ends,
+    )  # fmt: skip
 
 
 def _guard_field(system: Any, parameters: Mapping[str, float], expressions: Sequence[sp.Expr]) -> tuple[Any, int]:

@@ -2,10 +2,10 @@
 
     x' = f(t, x, p), x(t_0) = x_0;      Phi' = J Phi, Phi(t_0) = I;      (dx/dp)' = J dx/dp + df/dp
 
-The derivative by a parameter of a forced system is taken at fixed phase t / T(p), where it does not grow with t through
-T(p) alone. An interval is cut at the jumps of the right-hand side in time; each piece is one compiled call
-(kernels/runge_kutta.py), order 8 with dense output of order 7. Where the system has stops or switches in its states, the
-pieces end at the events and the variations pass them by saltation (integration/nonsmooth.py).
+The derivative by a parameter of a forced system is taken at fixed phase t / T(p), where it does not grow with t
+through T(p) alone. An interval is cut at the jumps of the right-hand side in time; each piece is one compiled call
+(kernels/runge_kutta.py), order 8 with dense output of order 7. Where the system has stops or switches in its states,
+the pieces end at the events and the variations pass them by saltation (integration/nonsmooth.py).
 """
 
 from __future__ import annotations

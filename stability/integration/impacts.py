@@ -2,9 +2,9 @@ r"""What happens at a wall: restitution, and chatter that ends in sticking.
 
     q = position:    q'+ = -e q'-,   0 <= e <= 1           (the other velocities do not change)
 
-With e < 1 a body pressed on a wall bounces infinitely often in a finite time; the heights of the bounces, r^2/(2 a) for a
-rebound speed r and a pressing acceleration a, form a geometric series. When the height is below the tolerance of the
-coordinate the rest of the series is not followed: the body is on the wall, q' = 0, and is held there until the
+With e < 1 a body pressed on a wall bounces infinitely often in a finite time; the heights of the bounces, r^2/(2 a)
+for a rebound speed r and a pressing acceleration a, form a geometric series. When the height is below the tolerance
+of the coordinate the rest of the series is not followed: the body is on the wall, q' = 0, and is held there until the
 acceleration that it would have without the wall points away. A free body (a <= 0) is never held.
 
 The restitution acts on one coordinate: the equations must not couple its acceleration with others through the mass

@@ -65,9 +65,8 @@ class Chain:
 
     def values(self, x: Array | None = None, t: float | None = None) -> Array:
         """All guards at (x, t), here and now by default."""
-        found = guarded_steps.values(
-            self.guards.field.address("F"), self.P, self.x if x is None else x, self.t if t is None else t, self.guards.size
-        )
+        at, now = self.x if x is None else x, self.t if t is None else t
+        found = guarded_steps.values(self.guards.field.address("F"), self.P, at, now, self.guards.size)
         return np.asarray(found[: self.guards.count])
 
     def slope(self, x: Array) -> Array:
@@ -87,19 +86,19 @@ class Chain:
         self.fresh = zero.copy()
         self.active = kinds != "release"
         self.signs = np.where((kinds == "wall") | (kinds == "release"), 1.0, signs)
-        for k in np.nonzero(kinds == "switch")[0]:
+        for k in np.nonzero(kinds == "switch")[0].tolist():
             self.P[guards.own + k] = self.signs[k]
         first = guards.first("wall")
-        for k, wall in enumerate(guards.walls):
+        for number, wall in enumerate(guards.walls):
             gap = wall.side * (wall.position - self.z[wall.coordinate, 0])
             if gap < -1e-12 * max(1.0, abs(wall.position)):
-                name = self.engine.system.states[wall.coordinate]
+                name, value = self.engine.system.states[wall.coordinate], self.z[wall.coordinate, 0]
                 raise InputError(
-                    f"the motion starts beyond the {wall.name} at {wall.position:g}: {name} = {self.z[wall.coordinate, 0]:g}"
+                    f"the motion starts beyond the {wall.name} at {wall.position:g}: {name} = {value:g}"
                 )
-            self.fresh[first + k] = gap <= 1e-13 * max(1.0, abs(wall.position))
-            if self.fresh[first + k] and wall.side * self.z[wall.velocity, 0] > 0:
-                self._wall(first + k)
+            self.fresh[first + number] = gap <= 1e-13 * max(1.0, abs(wall.position))
+            if self.fresh[first + number] and wall.side * self.z[wall.velocity, 0] > 0:
+                self._wall(first + number)
 
     def _ahead(self, t1: float) -> Array:
         """The guards a moment later, by the system's own field (its switches decide for themselves)."""
@@ -123,7 +122,9 @@ class Chain:
             self.z = z
         return status, guard
 
-    def _integrate(self, z: Array, t: float, end: float, inside: float, h: float, steps: int, which: Array, dense: bool) -> Any:
+    def _integrate(
+        self, z: Array, t: float, end: float, inside: float, h: float, steps: int, which: Array, dense: bool
+    ) -> Any:
         rate = 1.0 / self.engine.period(self.P[: self.guards.own])
         address = self.guards.smooth.address if len(which) else self.guards.address
         rates = self.rates if len(which) else np.zeros(0)
@@ -161,8 +162,10 @@ class Chain:
             self.edges.append(times[1:])
             self.nested.append(nested)
 
-    def _meet(self, start: Array, width: float, theta: float, guard: int, slope: float, end: float, dense: bool) -> Array:
-        """The state (n, 1) at the event: the step is taken again to end there, and the end corrected on the solution."""
+    def _meet(
+        self, start: Array, width: float, theta: float, guard: int, slope: float, end: float, dense: bool
+    ) -> Array:
+        """The state (n, 1) at the event: the step is taken again to end there, its end corrected on the solution."""
         at, low, none = self.t + theta * width, self.t, np.zeros(0, np.int64)
         z = start
         for _ in range(4):

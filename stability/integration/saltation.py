@@ -5,9 +5,9 @@ the field is f+ in place of f-. To first order a deviation d- in front becomes, 
 
     d+ = R' d- + (f+ - R' f-) (g_x d- + g_p) / (g_x f- + g_t)
 
-(g_p for derivatives by a parameter only). For a continuous field without map this is the identity; a wall on q has R' = I
-but -e for the velocity, and det d+/d- = e^2 for one degree of freedom. Where the event is grazed, g_x f- + g_t = 0, the
-derivative does not exist.
+(g_p for derivatives by a parameter only). For a continuous field without map this is the identity; a wall on q has R'
+= I but -e for the velocity, and det d+/d- = e^2 for one degree of freedom. Where the event is grazed, g_x f- + g_t =
+0, the derivative does not exist.
 
 Reference: R. I. Leine, H. Nijmeijer (2004), Dynamics and Bifurcations of Non-Smooth Mechanical Systems, chapter 7;
 P. C. Mueller (1995), Chaos, Solitons and Fractals 5, 1671.

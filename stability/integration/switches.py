@@ -1,8 +1,8 @@
 r"""Switches of a right-hand side, frozen: piecewise smooth systems as smooth systems with modes.
 
-A kink or jump in the states (|a|, sign a, Heaviside a, max, min, Piecewise) is decided by the sign of a *guard* g(t, x, p).
-Each guard gets a mode sigma = +1 or -1, an extra parameter, and the right-hand side is rewritten so that it depends on
-the modes and no longer on the signs:
+A kink or jump in the states (|a|, sign a, Heaviside a, max, min, Piecewise) is decided by the sign of a *guard* g(t,
+x, p). Each guard gets a mode sigma = +1 or -1, an extra parameter, and the right-hand side is rewritten so that it
+depends on the modes and no longer on the signs:
 
     |a| -> sigma a      sign a -> sigma      max(a, b) -> a where sigma > 0, else b      (g = a - b)      and so on.
 
@@ -11,7 +11,8 @@ look over the edge without seeing the other side, the Runge-Kutta method keeps i
 root of g. Under a fractional power or a logarithm the pieces do not continue; there the guard is located, but the
 expression keeps its own form. Switches that depend on time alone are the system's `breaks`.
 
-Reference: E. Hairer, S. P. Norsett, G. Wanner (1993), section II.6 (discontinuous right-hand sides); A. F. Filippov (1988).
+Reference: E. Hairer, S. P. Norsett, G. Wanner (1993), section II.6 (discontinuous right-hand sides); A. F. Filippov
+(1988).
 """
 
 from __future__ import annotations

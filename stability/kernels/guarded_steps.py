@@ -1,5 +1,6 @@
-r"""Events on the dense output of Runge-Kutta steps: guards w_k = sign_k g_k(x, t, p) >= 0, an event is a guard that turns
-negative.
+r"""Events on the dense output of Runge-Kutta steps.
+
+Guards w_k = sign_k g_k(x, t, p) >= 0: an event is a guard that turns negative.
 
 Every guard is looked at at nine points of every step, with slopes, so that a guard that dips below zero and comes back
 within a step is seen, too (two events in one step; grazing). The root is bisected to rounding. A guard that stands at
@@ -54,7 +55,7 @@ def _look(guards, P, times, coefficients, j, theta, X, F, none, phase):  # type:
 
 @kernel(inline=True)
 def _brackets(W, S, k, fresh, best):  # type: ignore[no-untyped-def]
-    """(interval, kind): first interval of guard k with an event; kind 0 none, 1 root, 2 perhaps a dip, 3 early return."""
+    """(interval, kind) of the first event of guard k: kind 0 none, 1 root, 2 perhaps a dip, 3 early return."""
     begin = 0
     if fresh:
         if W[k, 1] < 0.0:
@@ -90,7 +91,7 @@ def scan(guards, P, times, coefficients, size, count, signs, active, fresh):  # 
                     W[k, i] = signs[k] * F[0, k]
                 else:
                     S[k, i] = (signs[k] * F[0, k] - W[k, i]) / shift
-        best, which, lo, hi = 2.0, -1, 0.0, 0.0
+        best, which, hi = 2.0, -1, 0.0
         for k in range(count):
             if not active[k]:
                 continue
@@ -153,7 +154,7 @@ def scan(guards, P, times, coefficients, size, count, signs, active, fresh):  # 
                         else:
                             low = middle
                     if high < best:
-                        best, which, lo, hi = high, k, low, high
+                        best, which, hi = high, k, high
         if which >= 0:
             before = hi - _DELTA
             _look(guards, P, times, coefficients, j, before, X, F, none, phase)

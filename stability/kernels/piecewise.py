@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 __all__ = [
-    "NODES", "at", "bounds", "crossings", "derivative", "extrema", "from_nodes", "from_steps", "integrals", "node_times",
-    "projections", "restricted",
+    "NODES", "at", "bounds", "crossings", "derivative", "extrema", "from_nodes", "from_steps", "integrals",
+    "node_times", "projections", "restricted",
 ]  # fmt: skip
 
 Array = np.ndarray
@@ -95,7 +95,7 @@ def restricted(edges: Array, coefficients: Array, t0: float, t1: float) -> tuple
 
 
 def crossings(edges: Array, column: Array, direction: int = 0, parts: int = 16) -> Array:
-    """Times at which a column (K, d + 1) changes its sign: bracketed on a grid of `parts` a piece, bisected to rounding.
+    """Times at which a column (K, d + 1) changes its sign: bracketed on a grid of `parts` a piece, then bisected.
 
     direction +1 keeps upward crossings, -1 downward ones. A jump over zero between two pieces is no crossing.
     """

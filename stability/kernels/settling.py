@@ -1,7 +1,7 @@
 r"""How much of a transient is left, from stroboscopic states x_k = x(k T).
 
-Near a stable orbit of period m T the differences d_k = |x_k - x_(k-m)| decay like r^k. With the largest of the last L of
-them, D1, and of the L before, D0, the rate is r^L = D1/D0, and what is left to travel is at most
+Near a stable orbit of period m T the differences d_k = |x_k - x_(k-m)| decay like r^k. With the largest of the last L
+of them, D1, and of the L before, D0, the rate is r^L = D1/D0, and what is left to travel is at most
 
     sum_(j >= 1) d r^(m j) = d r^m / (1 - r^m),         r >= 1: K D1, as if it went on for as long as it was watched
 

@@ -1,9 +1,9 @@
 """A frequency sweep as on a shaker: what was recorded at each value of the parameter, in the order it was visited.
 
-At each value the last `record` periods of a dwell of `periods` periods give the largest and smallest values, the mean and
-the harmonics of every state and output. `transient` is the estimated part of the transient that was still alive then
-(kernels/settling.py), `settled` says whether it is at most 1 %. A jump is where the response changes although the step
-of the parameter is refined.
+At each value the last `record` periods of a dwell of `periods` periods give the largest and smallest values, the mean
+and the harmonics of every state and output. `transient` is the estimated part of the transient that was still alive
+then (kernels/settling.py), `settled` says whether it is at most 1 %. A jump is where the response changes although
+the step of the parameter is refined.
 """
 
 from __future__ import annotations
@@ -144,7 +144,8 @@ class Sweep:
 
     def _harmonic(self, k: int) -> NDArray[np.complex128]:
         if not 0 <= k < self.coefficients.shape[2]:
-            raise InputError(f"harmonic {k}: this sweep has 0 to {self.coefficients.shape[2] - 1}; sweep with harmonics={k}")
+            top = self.coefficients.shape[2] - 1
+            raise InputError(f"harmonic {k}: this sweep has 0 to {top}; sweep with harmonics={k}")
         return self.coefficients[:, :, k]
 
     def amplitude(self, k: int = 1) -> Mapping[str, Array]:
@@ -157,7 +158,7 @@ class Sweep:
         return _Columns(self.names, np.angle(self._harmonic(k)))
 
     def plot(self, ax: Any = None, y: str | None = None, **options: Any) -> Any:
-        """Draw the response over the parameter; `y` is a state or output with a measure, "y.max", "y.min", "y.pp", ..."""
+        """Draw the response over the parameter; `y` is a state or output with a measure: "y.max", "y.min", "y.pp"."""
         from ..plots.sweeps import plot_sweep
 
         return plot_sweep(self, ax=ax, y=y, **options)
@@ -203,6 +204,6 @@ class Sweep:
     @classmethod
     def from_storage(cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Sweep:
         """The inverse of `to_storage`."""
-        fields = dict(header)
+        fields: dict[str, Any] = {**header, **arrays}
         fields["jumps"] = tuple(Jump(p, tuple(b), before, after) for p, b, before, after in fields["jumps"])
-        return cls(**fields, **arrays)
+        return cls(**fields)

@@ -128,7 +128,7 @@ class Trajectory:
             object.__setattr__(self, key, MappingProxyType(dict(getattr(self, key))))
         for key in ("states", "angles", "output_names"):
             object.__setattr__(self, key, tuple(getattr(self, key)))
-        object.__setattr__(self, "events", tuple(Happening(*e) for e in self.events))
+        object.__setattr__(self, "events", tuple(Happening(*e[:3], tuple(e[3]), tuple(e[4])) for e in self.events))
 
     # ------------------------------------------------------------------ values
     @property
@@ -148,8 +148,9 @@ class Trajectory:
         # a hair inside the pieces: an output may jump where the forcing does
         width = np.diff(self.edges)[:, None]
         times = self.edges[:-1, None] + width * (1e-12 + (1 - 2e-12) * piecewise.NODES)
-        nested = np.einsum("ik,jkn->jin", np.polynomial.chebyshev.chebvander(2 * piecewise.NODES - 1, 7), self.coefficients)
-        values = self._outputs(times.ravel(), nested.reshape(-1, len(self.states)))
+        basis = np.polynomial.chebyshev.chebvander(2 * piecewise.NODES - 1, 7)
+        states = np.einsum("ik,jkn->jin", basis, self.coefficients)
+        values = self._outputs(times.ravel(), states.reshape(-1, len(self.states)))
         return piecewise.from_nodes(values.reshape(*times.shape, -1))
 
     def _column(self, name: str) -> Array:
@@ -165,7 +166,8 @@ class Trajectory:
         slack = 1e-12 * max(abs(t0), abs(t1))
         if times.size and not (times.min() >= t0 - slack and times.max() <= t1 + slack):
             why = "" if self.status is Ending.COMPLETED else f" ({self.status})"
-            raise InputError(f"t from {times.min():g} to {times.max():g} is outside this trajectory, [{t0:g}, {t1:g}]{why}")
+            asked = f"t from {times.min():g} to {times.max():g}"
+            raise InputError(f"{asked} is outside this trajectory, [{t0:g}, {t1:g}]{why}")
         return times
 
     def __call__(self, t: Any, name: str | None = None) -> Array:
@@ -218,7 +220,9 @@ class Trajectory:
 
     def _period(self, what: str) -> float:
         if self.period is None:
-            raise InputError(f"{what} needs a forcing period; '{self.system}' is autonomous: use window(t0, t1) or section=")
+            raise InputError(
+                f"{what} needs a forcing period; '{self.system}' is autonomous: use window(t0, t1) or section="
+            )
         return self.period
 
     @cached_property
@@ -294,7 +298,7 @@ class Trajectory:
         values = self(np.linspace(t0, t1, count, endpoint=False), name)
         window = np.hanning(count + 1)[:-1]
         heights = np.abs(np.fft.rfft((values - values.mean()) * window)) * 2 / window.sum()
-        return Spectrum(np.fft.rfftfreq(count, (t1 - t0) / count), heights)
+        return Spectrum(np.asarray(np.fft.rfftfreq(count, (t1 - t0) / count), float), np.asarray(heights, float))
 
     @cached_property
     def transient(self) -> tuple[float, int]:

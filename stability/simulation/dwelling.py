@@ -1,8 +1,8 @@
 r"""One dwell: a number of periods at fixed parameters, and what the last of them say.
 
 Largest and smallest values are those of the dense output between its steps; harmonics are integrals over the recorded
-periods, c_k = mean of x exp(-2 pi i k t/T), with t = 0 at phase 0; the transient left is estimated from the stroboscopic
-states of the whole dwell (kernels/settling.py).
+periods, c_k = mean of x exp(-2 pi i k t/T), with t = 0 at phase 0; the transient left is estimated from the
+stroboscopic states of the whole dwell (kernels/settling.py).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["Dwell", "dwell"]
 
 Array = np.ndarray
 # (8, 8): monomial coefficients on [-1, 1] from Chebyshev ones
-_MONOMIALS = np.array([np.polynomial.chebyshev.cheb2poly(row).tolist() + [0.0] * (7 - k) for k, row in enumerate(np.eye(8))]).T
+_MONOMIALS = np.array([np.append(np.polynomial.chebyshev.cheb2poly(row), [0.0] * 8)[:8] for row in np.eye(8)]).T
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +50,9 @@ class Dwell:
 
 
 def dwell(
-    engine: Engine, params: Array, x0: Array, period: float, periods: int, record: int, harmonics: int, precision: Precision
-) -> Dwell:
+    engine: Engine, params: Array, x0: Array, period: float, periods: int, record: int, harmonics: int,
+    precision: Precision,
+) -> Dwell:  # fmt: skip
     """Run `periods` periods from x0 at phase 0 and measure the last `record` of them."""
     system = engine.system
     motion = engine.run(params, x0, 0.0, periods * period, precision)

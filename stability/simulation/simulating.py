@@ -2,8 +2,9 @@ r"""`simulate`: a system in time, from given states, to a given accuracy.
 
     x' = f(t, x, p),   x(t0) = x0,          local error per step <= atol + rtol |x|
 
-Hard stops, kinks and jumps of the right-hand side in the states, and a user's events are located on the way. The compiled explicit Runge-Kutta method of order 8 of integration/engine.py; stiff systems by scipy's implicit methods
-on request. The result is dense. Motions of a batch run in threads and give the same bytes for any number of them.
+Hard stops, kinks and jumps of the right-hand side in the states, and a user's events are located on the way. The
+compiled explicit Runge-Kutta method of order 8 of integration/engine.py; stiff systems by scipy's implicit methods on
+request. The result is dense. Motions of a batch run in threads and give the same bytes for any number of them.
 
 Reference: E. Hairer, S. P. Norsett, G. Wanner (1993), Solving Ordinary Differential Equations I.
 """
@@ -64,7 +65,8 @@ class Ensemble(Sequence[Trajectory]):
 
     def __repr__(self) -> str:
         bad = sum(member.status is not Ending.COMPLETED for member in self.members)
-        return f"Ensemble of {len(self)} trajectories of {self.members[0].system}" + (f" | {bad} not completed" if bad else "")
+        tail = f" | {bad} not completed" if bad else ""
+        return f"Ensemble of {len(self)} trajectories of {self.members[0].system}{tail}"
 
 
 def simulate(
@@ -116,7 +118,8 @@ def simulate(
     t0, t1 = checked_span(span)
     precision = Precision(rtol, atol, max_steps)
     if method != "DOP853" and method not in _STIFF:
-        raise InputError(f"method = {method!r}; there is 'DOP853', and for stiff systems {', '.join(map(repr, _STIFF))}")
+        others = ", ".join(map(repr, _STIFF))
+        raise InputError(f"method = {method!r}; there is 'DOP853', and for stiff systems {others}")
     if workers is not None and workers < 1:
         raise InputError(f"workers = {workers}: a whole number >= 1 is needed")
     X, P, count = batch(system, x0, params)

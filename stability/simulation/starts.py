@@ -38,7 +38,8 @@ def _states(system: Any, x0: Any) -> Array:
         values = np.asarray(x0, float)
         if values.ndim != 2 or len(values) != system.n:
             listing = ", ".join(system.states)
-            raise InputError(f"states of '{system.name}' have shape ({system.n},) or ({system.n}, B): {listing}; got {values.shape}")
+            shapes = f"({system.n},) or ({system.n}, B)"
+            raise InputError(f"states of '{system.name}' have shape {shapes}: {listing}; got {values.shape}")
     else:
         check_names("state", x0, system.states)
         try:

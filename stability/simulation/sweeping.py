@@ -1,13 +1,13 @@
 r"""`sweep`: an experiment on the shaker, simulated.
 
-At every value of the parameter the system dwells for a number of forcing periods; the last few are recorded. The state
-is carried over to the next value (``start="carry"``: both stable branches are found, one in each direction) or the
-system starts from rest each time (``start="rest"``). A dwell begins at phase 0 and lasts whole periods, so that a carried
-forcing is continuous. The order of the ends is the direction.
+At every value of the parameter the system dwells for a number of forcing periods; the last few are recorded. The
+state is carried over to the next value (``start="carry"``: both stable branches are found, one in each direction) or
+the system starts from rest each time (``start="rest"``). A dwell begins at phase 0 and lasts whole periods, so that a
+carried forcing is continuous. The order of the ends is the direction.
 
-Jumps: where the response differs more between two neighbours than between theirs, the interval is halved again and again
-from the carried state on the near side; what keeps its size is a jump. A sweep through a fold jumps late, by the delay
-of the passage: more periods bring the jump to the fold.
+Jumps: where the response differs more between two neighbours than between theirs, the sweep is repeated from the near
+side with steps of 1/8, 1/64 and 1/512 of the interval; what keeps its size is a jump. A sweep through a fold jumps
+late, by the delay of the passage: more periods bring the jump to the fold.
 """
 
 from __future__ import annotations
@@ -32,10 +32,11 @@ __all__ = ["sweep"]
 
 Array = np.ndarray
 _POINTS = 100
-_HALVINGS = 8
+_PARTS = 8  # parts of an interval, level after level
+_LEVELS = 3
 _VISIBLE = 0.03  # of the largest response: smaller steps are not looked at
 _ABRUPT = 1.6  # times the neighbours' steps: what is looked at
-_KEPT = 0.4  # of its size: a jump is what keeps it while the interval is halved
+_KEPT = 0.4  # of its size: a jump is what keeps it while the steps get finer
 
 
 def sweep(
@@ -230,35 +231,46 @@ def _jumps(run: _Runner, values: Array, dwells: list[Dwell]) -> tuple[Jump, ...]
     padded = np.concatenate([[steps[1]], steps, [steps[-2]]])
     around = np.minimum(padded[:-2], padded[2:])
     candidates = np.nonzero((steps > _VISIBLE) & (steps > _ABRUPT * around))[0]
-    found: list[Jump] = []
-    for k in candidates:
+    found: dict[int, Jump] = {}
+    for k in candidates.tolist():
         jump = _located(run, float(values[k]), float(values[k + 1]), dwells[k], dwells[k + 1], unit, float(steps[k]))
         if jump is None:
             continue
-        if found and found[-1].bracket[1] == jump.bracket[0] and not dwells[k].settled:  # caught on its way
-            jump = Jump(found[-1].parameter, (found[-1].bracket[0], jump.bracket[1]), found[-1].before, jump.after)
-            found.pop()
-        found.append(jump)
-    return tuple(found)
+        if k - 1 in found and not dwells[k].settled:  # one jump, recorded on its way
+            found[k - 1] = found[k - 1]._replace(after=jump.after)
+        else:
+            found[k] = jump
+    return tuple(found.values())
 
 
 def _located(
     run: _Runner, lo: float, hi: float, before: Dwell, after: Dwell, unit: Array, size: float
 ) -> Jump | None:
+    """The jump by finer and finer steps from the near side; None where the response turns out to be steep only.
+
+    A large step may kick the motion off its branch before the branch ends: the finer steps go on beyond `hi` then.
+    """
+
     def distance(a: Dwell, b: Dwell) -> float:
         return float((np.abs(a.size - b.size)[: len(unit)] / unit).max())
 
-    carried = run.plan.start == "carry"
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (lo + hi)
-        found = run(middle, before.end if carried else run.plan.x0)
-        if found.ending is not Ending.COMPLETED:
-            return None
-        if distance(before, found) > distance(found, after):
-            hi, after = middle, found
+    carried, last, width = run.plan.start == "carry", run.plan.window[1], hi - lo
+    for level in range(1, _LEVELS + 1):
+        start, part = lo, width / _PARTS**level
+        for i in range(1, 3 * _PARTS + 1):
+            value = start + i * part
+            if (value - last) * part > 0:
+                return None
+            found = run(value, before.end if carried else run.plan.x0)
+            if found.ending is not Ending.COMPLETED:
+                return None
+            if distance(before, found) > _KEPT * size:
+                hi, after = value, found
+                break
+            if level == 1 and i == _PARTS and distance(found, after) < 0.5 * _KEPT * size:
+                return None
+            lo, before = value, found
         else:
-            lo, before = middle, found
-        if distance(before, after) < _KEPT * size:
             return None
     names = (*run.engine.system.states, *run.engine.system.outputs)
     sides = [{name: (float(d.low[i]), float(d.high[i])) for i, name in enumerate(names)} for d in (before, after)]
@@ -288,7 +300,7 @@ def _warn(result: Sweep) -> None:
     share = f"{100 * left:.2g} % of" if np.isfinite(left) else "an unknown part of"
     warnings.warn(
         f"{bad.size} of {len(result)} points have not settled in {result.periods} periods (worst at {result.name} = "
-        f"{result.parameter[worst]:.6g}: {share} the transient is left): use more periods, or the motion is not periodic",
+        f"{result.parameter[worst]:.6g}: {share} the transient is left): use more periods, or it is not periodic",
         UnsettledWarning,
         stacklevel=3,
     )
