@@ -1,15 +1,16 @@
 r"""Recognising a closed branch: has the curve come back to where it was, in the same direction?
 
 The first points of a branch are remembered, a few of them, so that one is away from folds. When the parameter passes
-the value of one of them again in the same direction, the solution there is computed and compared by its measures
-(extrema, amplitudes, period): they do not depend on the mesh, nor on the phase of an autonomous orbit.
+the value of one of them again in the same direction, the solution there is computed and compared by its extrema and
+period: they do not depend on the mesh, nor on the phase of an autonomous orbit.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..results.solutions import PeriodicOrbit
+from ..results.solutions import FixedPoint, PeriodicOrbit
 from .locating import Locator
 from .points import Point
 
@@ -47,11 +48,22 @@ class Home:
 
 
 def _same(p: Point, q: Point) -> bool:
-    one, other = p.problem.measures(p.u, p.params), q.problem.measures(q.u, q.params)
-    floor = _NOTHING * max(abs(v) for v in other.values())
-    return one.keys() == other.keys() and all(
-        abs(one[k] - v) <= _SAME * max(abs(v), abs(one[k])) + floor for k, v in other.items()
-    )
+    one, other = _invariants(p), _invariants(q)
+    if one.shape != other.shape:
+        return False
+    size = np.maximum(np.abs(one), np.abs(other)).max(axis=1)
+    return bool((np.abs(one - other).max(axis=1) <= _SAME * size + _NOTHING * size.max(initial=0.0)).all())
+
+
+def _invariants(point: Point) -> NDArray[np.float64]:
+    """(k, 2) numbers of a solution that depend neither on its mesh nor on its phase: extrema of every state, period."""
+    solution = point.problem.view(point.u, point.params)
+    if isinstance(solution, PeriodicOrbit):
+        rows = [[solution.max[s], solution.min[s]] for s in solution.states]
+        return np.array([*rows, [solution.period, solution.period]])
+    if isinstance(solution, FixedPoint):
+        return np.repeat(solution.x[:, None], 2, axis=1)
+    return np.repeat(np.array(list(point.problem.measures(point.u, point.params).values()))[:, None], 2, axis=1)
 
 
 def collapsed(point: Point) -> bool:
