@@ -6,7 +6,8 @@ The error of the nodes goes like N^(-2m); the wanted `accuracy` gives the number
 
 limited to a factor between 2/3 and 2, with a dead band so that the mesh rests while the error is between 1e-5 and 1
 times the accuracy. The intervals are placed by equidistribution (kernels/meshes.py) when the error per interval is
-uneven. Scales are the largest moduli of the states on the orbit, kept within a factor of 2 of them.
+uneven. Scales are the largest moduli of the states on the orbit, kept within a factor of 2 of them; those of an angle
+do not fall below a small part of a radian, so that a branch that is born where a pendulum hangs still leaves at once.
 """
 
 from __future__ import annotations
@@ -20,22 +21,37 @@ from ..kernels.meshes import equidistribute, monitor
 from ..protocols import Tangent
 
 if TYPE_CHECKING:
+    from ..systems.system import System
     from .collocation import Collocation
 
-__all__ = ["adapted", "state_scales"]
+__all__ = ["adapted", "natural_sizes", "state_scales"]
 
 Array = np.ndarray
 _UNEVEN = 1.5  # largest share of the monitor over the mean share that is left alone
 _TINY = 1e-6
+_ANGLE = 0.02  # rad
 
 
-def state_scales(values: Array) -> Array:
-    """(n,) largest moduli of values (K, n); a state that is (nearly) zero takes the largest scale of all, at most 1."""
+def natural_sizes(system: System, period: float) -> Array:
+    """(n,) smallest sensible scales: a small angle, and the velocity of swinging by it once a period; 0 elsewhere."""
+    sizes = np.zeros(system.n)
+    for angle in system.angles:
+        for name, size in ((angle, _ANGLE), (f"{angle}_dot", 2 * np.pi * _ANGLE / period)):
+            if name in system.states and np.isfinite(size):
+                sizes[system.states.index(name)] = size
+    return sizes
+
+
+def state_scales(values: Array, smallest: Array | float = 0.0) -> Array:
+    """(n,) largest moduli of values (K, n), not below `smallest` (see `natural_sizes`).
+
+    A state that is (nearly) zero takes the largest scale of all, at most 1.
+    """
     size = np.abs(values).max(axis=0)
     largest = float(size.max())
     if not np.isfinite(largest) or largest == 0.0:
         return np.ones(len(size))
-    return np.where(size > _TINY * largest, size, min(largest, 1.0))
+    return np.where(size > _TINY * largest, np.maximum(size, smallest), min(largest, 1.0))
 
 
 def adapted(
@@ -44,8 +60,9 @@ def adapted(
     """(problem, u, tangent) with a better mesh or better scales; None where the present ones are good."""
     mesh = problem.mesh
     nodes, stages, rest = mesh.split(u)
-    scales = state_scales(stages.reshape(-1, mesh.n))
     period_scale = float(rest[0]) if mesh.own else 1.0
+    period = period_scale if mesh.own else problem.orbit_period(params)
+    scales = state_scales(stages.reshape(-1, mesh.n), natural_sizes(problem.system, period))
     ratios = np.append(scales / problem.scales, period_scale / problem.period_scale)
     rescale = bool((ratios > 2).any() or (ratios < 0.5).any())
     if not rescale:
