@@ -122,10 +122,16 @@ def autoparametric_interval(
     first = (1 - p) ** 2 + 4 * xi1**2 * p
     second = (q**2 - p / 4) ** 2 + xi2**2 * p
     excess = 4 / g2**2 * first * second - f**2
-    roots = sorted(
-        float(r.real) for r in excess.roots().astype(complex).tolist() if abs(r.imag) <= 1e-9 * abs(r) and r.real > 0
-    )
-    edges = [0.0, *roots]
+    slope = (first * second).deriv()
+    roots = []
+    for root in excess.roots().astype(complex).tolist():
+        z = root.real
+        if abs(root.imag) > 1e-9 * abs(root) or z <= 0:
+            continue
+        for _ in range(3):  # Newton on the factors: the expanded quartic has lost digits
+            z -= float((first(z) * second(z) - (f * g2 / 2) ** 2) / slope(z)) if slope(z) != 0 else 0.0
+        roots.append(z)
+    edges = [0.0, *sorted(roots)]
     found = []
     for low, high in itertools.pairwise(edges):
         if excess((low + high) / 2) < 0:

@@ -154,7 +154,8 @@ def duffing_folds(*, xi: float, beta: float, force: float | None = None) -> tupl
     Returns
     -------
     tuple of (Omega, amplitude)
-        Descending in amplitude; empty for a single-valued response, one fold for an open resonance.
+        Descending in amplitude; empty for a single-valued response, one fold for an open resonance; a softening spring
+        has one more at amplitudes where it has long lost its stiffness.
 
     Raises
     ------

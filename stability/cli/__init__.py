@@ -23,6 +23,7 @@ __all__ = ["main"]
 
 # command -> one line of help; the module stability.cli.<command> holds it under the name `command`
 COMMANDS: dict[str, str] = {
+    "average": "The slow flow by averaging or multiple scales, as text or LaTeX.",
     "chart": "Stability chart (instability tongues) over two parameters.",
     "continue": "Follow a branch of solutions, with its special points.",
     "demo": "A guided tour: writes figures and prints a table.",

@@ -118,7 +118,9 @@ def test_coefficients_of_real_powers():
     for n, number in listed.items():
         c = 2 * float(moment(sp.Integer(n + 1), sp.Integer(0)))
         assert c == pytest.approx(number, abs=5e-7)
-        assert c == pytest.approx(quad(lambda s, n=n: abs(math.cos(s)) ** (n + 1), 0, math.pi / 2)[0] * 4 / math.pi, rel=1e-10)
+        assert c == pytest.approx(
+            quad(lambda s, n=n: abs(math.cos(s)) ** (n + 1), 0, math.pi / 2)[0] * 4 / math.pi, rel=1e-10
+        )
 
 
 @pytest.mark.parametrize("n", [2, 3, 4, 5, 7])
@@ -169,7 +171,12 @@ def test_quadratic_and_cubic_force_with_drift():
     size = sp.Symbol("x_amplitude", real=True)
     time = sp.Symbol("t", real=True)
     shape = slow.reconstruction["x"].subs(slow.outputs["frequency"] * time, sp.Symbol("p"))
-    assert sp.expand(slow.reconstruction["x"].subs(time, 0) - size - alpha * size**2 * (sp.Rational(1, 6) - sp.Rational(1, 2))) == 0
+    assert (
+        sp.expand(
+            slow.reconstruction["x"].subs(time, 0) - size - alpha * size**2 * (sp.Rational(1, 6) - sp.Rational(1, 2))
+        )
+        == 0
+    )
     assert shape.has(alpha)
     errors = []
     for e in SMALL:
@@ -193,7 +200,9 @@ def test_power_law_damping(p):
     for k, e in enumerate(SMALL):
         end = 2 * math.pi * 2**k
         averaged = solve_ivp(lambda s, y, e=e: slow(s, y, delta=e), (0, end), [1.0], **TIGHT).y[0, -1]
-        full = solve_ivp(lambda s, y, e=e: [y[1], -y[0] - e * abs(y[1]) ** (p - 1) * y[1]], (0, end), [1.0, 0.0], **TIGHT)
+        full = solve_ivp(
+            lambda s, y, e=e: [y[1], -y[0] - e * abs(y[1]) ** (p - 1) * y[1]], (0, end), [1.0, 0.0], **TIGHT
+        )
         errors.append(abs(averaged - math.hypot(*full.y[:, -1])))
     assert_order(errors, 2.0, slack=0.06)
 
@@ -220,7 +229,12 @@ def limit_cycle_period(mu):
     turning.direction = -1
     end = 30 / mu
     run = solve_ivp(
-        lambda s, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]], (0, end + 14), [2.0, 0.0], events=turning, max_step=0.5, **TIGHT
+        lambda s, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]],
+        (0, end + 14),
+        [2.0, 0.0],
+        events=turning,
+        max_step=0.5,
+        **TIGHT,
     )
     times = [s for s in run.t_events[0] if s > end]
     return times[1] - times[0]

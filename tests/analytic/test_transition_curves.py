@@ -69,10 +69,22 @@ def test_any_order_with_rational_coefficients(n):
 
 def test_terms_of_the_handbook():
     """DLMF 28.6.2-28.6.6."""
-    assert sp.expand(st.transition_series(1, 6)[1] - (1 + q - q**2 / 8 - q**3 / 64 - q**4 / 1536 + 11 * q**5 / 36864 + 49 * q**6 / 589824)) == 0
+    assert (
+        sp.expand(
+            st.transition_series(1, 6)[1]
+            - (1 + q - q**2 / 8 - q**3 / 64 - q**4 / 1536 + 11 * q**5 / 36864 + 49 * q**6 / 589824)
+        )
+        == 0
+    )
     assert sp.expand(st.transition_series(0, 6)[0] - (-(q**2) / 2 + 7 * q**4 / 128 - 29 * q**6 / 2304)) == 0
-    assert sp.expand(st.transition_series(2, 6)[1] - (4 + 5 * q**2 / 12 - 763 * q**4 / 13824 + 1002401 * q**6 / 79626240)) == 0
-    assert sp.expand(st.transition_series(3, 5)[0] - (9 + q**2 / 16 - q**3 / 64 + 13 * q**4 / 20480 + 5 * q**5 / 16384)) == 0
+    assert (
+        sp.expand(st.transition_series(2, 6)[1] - (4 + 5 * q**2 / 12 - 763 * q**4 / 13824 + 1002401 * q**6 / 79626240))
+        == 0
+    )
+    assert (
+        sp.expand(st.transition_series(3, 5)[0] - (9 + q**2 / 16 - q**3 / 64 + 13 * q**4 / 20480 + 5 * q**5 / 16384))
+        == 0
+    )
 
 
 def floquet_boundary(n, e, damping, guess, half_width):
@@ -140,7 +152,7 @@ def test_form_with_frequency():
     xi, h = 0.01, 0.08
     for sign in (-1, 1):
         Omega = brentq(
-            lambda w: (1 - w * w) + sign * math.sqrt(h * h / 4 - 4 * xi * xi * w * w), 0.9, 1.1, xtol=1e-15
+            lambda w, sign=sign: (1 - w * w) + sign * math.sqrt(h * h / 4 - 4 * xi * xi * w * w), 0.9, 1.1, xtol=1e-15
         )
         a_, q_, mu_ = 1 / Omega**2, h / (2 * Omega**2), xi / Omega
         curve = st.transition_series(1, 1, damping=True)[0 if sign > 0 else 1]
@@ -148,7 +160,9 @@ def test_form_with_frequency():
         assert numbers(curve, q=q_, mu=mu_) == pytest.approx(a_, abs=1e-12)
 
 
-@pytest.mark.parametrize("bad", [dict(n=-1), dict(n=1.5), dict(n=2, order=99), dict(n=0, damping=True), dict(n=3, order=2, damping=True)])
+@pytest.mark.parametrize(
+    "bad", [dict(n=-1), dict(n=1.5), dict(n=2, order=99), dict(n=0, damping=True), dict(n=3, order=2, damping=True)]
+)
 def test_refusals(bad):
     with pytest.raises(InputError):
         st.transition_series(**bad)
