@@ -17,6 +17,7 @@ _EXPORTS: dict[str, str] = {
     "switch": "problems.switching",
     "solve": "following.driver",
     "continuation": "following.driver",
+    "Sensitivity": "results.sensitivity_table",
     "SpecialPoint": "results.special",
     "PeriodicOrbit": "results.solutions",
     "FixedPoint": "results.solutions",

@@ -144,7 +144,7 @@ class Locus:
         return np.concatenate([u, [values[self.free]], first_extra(self.kind, self.inner.critical, spectrum.values)])
 
     # ------------------------------------------------------------------ Newton
-    def linearise(self, u: Array, params: Array) -> ExtendedLinearisation:
+    def linearise(self, u: Array, params: Array) -> Any:
         """The extended linearisation at any point."""
         other = self.along if self.along != self.free else next(n for n in self.parameters if n != self.free)
         return ExtendedLinearisation.at(self, u, params, other)
@@ -198,7 +198,7 @@ class Locus:
             length = math.sqrt(float(self.weights @ t_u**2) + (tangent.weight * rate) ** 2)
             new = Tangent(t_u / length, rate / length, tangent.weight)
         try:
-            L = ExtendedLinearisation.at(self, u, params, free)
+            L: Any = ExtendedLinearisation.at(self, u, params, free)
         except np.linalg.LinAlgError:
             return _failed(u, params, iterations, "singular")
         residual = float(np.max(np.abs(L.residual)))

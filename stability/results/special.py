@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from types import MappingProxyType
 from typing import Any
 
@@ -84,6 +85,36 @@ class SpecialPoint:
     def params_vector(self) -> NDArray[np.float64]:
         """(m,) parameter values in the problem's order."""
         return np.array(list(self.params.values()))
+
+    def sensitivity(self, of: str | None = None) -> Any:
+        """How the place of this point moves with every other parameter: derivatives, ranked.
+
+        Parameters
+        ----------
+        of : str or None
+            The parameter in which the place is told, d of / d other; by default the one the branch was continued in.
+            On a curve of special points (`locus`) with an extremum of `of` at this point, it is the extremum's rate.
+
+        Returns
+        -------
+        Sensitivity
+            ``table["xi"]`` is the derivative; ``table.relative`` in per cent for per cent; printed, a ranked table.
+
+        Raises
+        ------
+        InputError, UnknownNameError
+            A kind without a defining system; no such parameter.
+        ConvergenceError
+            The point does not move with `of`, or is one of higher codimension.
+
+        Examples
+        --------
+        >>> import stability as st
+        >>> branch = st.continuation(st.Equilibrium(st.models.lorenz()), "rho", (15, 30), start=dict(x=6, y=6, z=14))
+        >>> round(branch["HB1"].sensitivity()["sigma"], 6)  # rho = sigma (sigma + b + 3)/(sigma - b - 1)
+        0.146814
+        """
+        return import_module("stability.problems.sensitivity").sensitivity(self, of)
 
     def __repr__(self) -> str:
         named = f" '{self.name}'" if self.name else ""
