@@ -220,7 +220,7 @@ def _from_seed(seed: Seed, settings: Settings) -> Branch:
     if ahead is not None and ahead.status is Status.CLOSED_LOOP:
         behind = None  # the loop came back along the other side
         _end_at_birth(ahead, birth)
-    if behind is not None:
+    if behind is not None and not (ahead is not None and ahead.interrupted):
         behind.run()
     if ahead is None and behind is None:
         raise ConvergenceError(
@@ -233,15 +233,16 @@ def _from_seed(seed: Seed, settings: Settings) -> Branch:
     if behind is not None:
         entries = [_turned(e) for e in reversed(behind.entries)] + entries
     closed = ahead is not None and ahead.status is Status.CLOSED_LOOP
-    first = Status.CLOSED_LOOP if closed and two else _ended(behind) if two else Status.STOPPED
+    interrupted = ahead is not None and ahead.interrupted
+    first = Status.CLOSED_LOOP if closed and two else Status.STOPPED if interrupted or not two else _ended(behind)
     return assemble(settings, entries, (first, _ended(ahead)), (behind, ahead))
 
 
 def _end_at_birth(follower: Follower, birth: Point) -> None:
     """A loop that came back to its branch point ends there, and the point is listed once."""
-    for k in range(len(follower.entries) - 1, 0, -1):
-        point, found = follower.entries[k]
-        again = found is not None and found.kind in (Kind.BRANCH_POINT, Kind.FOLD)
+    end = follower.entries[-1].point.s if follower.entries else 0.0
+    for k, (point, found) in enumerate(follower.entries):
+        again = found is not None and found.kind in (Kind.BRANCH_POINT, Kind.FOLD) and point.s > 0.9 * end
         if again and abs(point.parameter - birth.parameter) * birth.tangent.weight < 1e-5:
             follower.entries[k:] = [Entry(point, None)]
             return

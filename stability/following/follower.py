@@ -60,6 +60,7 @@ class Follower(Iterator[Point]):
         self.since_adapt = since_adapt
         self.entries: list[Entry] = []
         self.status: Status | None = None
+        self.interrupted = False
         self.accepted = 0
         self.mirrored = mirrored  # beyond its other end the branch repeats itself, shifted in time
         self.home = Home(first) if home is None else home
@@ -97,7 +98,7 @@ class Follower(Iterator[Point]):
             for _ in self:
                 pass
         except KeyboardInterrupt:
-            self.status = Status.STOPPED
+            self.status, self.interrupted = Status.STOPPED, True
         return self
 
     # ------------------------------------------------------------------ one step

@@ -145,6 +145,15 @@ def test_interrupt_keeps_everything() -> None:
     assert branch.status is st.Status.STOPPED and len(branch) == 8
 
 
+def test_interrupt_on_one_half_does_not_start_the_other() -> None:
+    def interrupt(progress: object) -> None:
+        raise KeyboardInterrupt
+
+    trivial = st.continuation(one_state(a * x - x**3, a=0.0), "a", (-1.0, 1.0))
+    side = st.continuation(st.switch(trivial["BP1"]), "a", (-1.0, 1.0), progress=interrupt)
+    assert side.statuses == (st.Status.STOPPED,) * 2 and 2 <= len(side) < 6
+
+
 def test_extend_equals_one_long_run() -> None:
     problem = one_state(a + 2 * x - x**3, a=0.0)
     options = {"start": [-2.5], "ds_max": 0.05}

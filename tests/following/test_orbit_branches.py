@@ -101,6 +101,23 @@ def test_pendulum_instability_and_the_branch_born_there(
     assert swing.solution(5).max["theta"] > 0.01
 
 
+def test_asymmetric_loops_are_followed_once() -> None:
+    """From a symmetry-breaking point to the other one and back along the mirror image: closed, every point twice."""
+    system = st.models.autoparametric_pendulum(
+        length_ratio=10.0, mass_ratio_total=0.2, Omega0=0.5, xi1=0.02, xi2=0.01, base_term=False
+    )
+    semi = st.continuation(st.Collocation(system), "Omega", (0.5, 1.5))
+    swing = st.continuation(st.switch(semi["PD1"]), "Omega", (0.5, 1.5))
+    for born, other in (("BP1", "BP2"), ("BP3", "BP4")):
+        loop = st.continuation(st.switch(swing[born]), "Omega", (0.5, 1.5))
+        assert loop.status is st.Status.CLOSED_LOOP
+        crossings = [p.params["Omega"] for p in loop.of_kind(st.Kind.BRANCH_POINT)]
+        np.testing.assert_allclose(crossings, [swing[born].params["Omega"], swing[other].params["Omega"]], atol=1e-7)
+        for kind in (st.Kind.PERIOD_DOUBLING, st.Kind.NEIMARK_SACKER, st.Kind.FOLD):
+            places = sorted(p.params["Omega"] for p in loop.of_kind(kind))
+            np.testing.assert_allclose(places[::2], places[1::2], atol=1e-8)
+
+
 def test_default_pendulum_goes_to_a_torus() -> None:
     semi = st.continuation(st.Collocation(st.models.autoparametric_pendulum()), "Omega", (0.5, 1.5))
     swing = st.continuation(st.switch(semi["PD1"]), "Omega", (0.5, 1.5))
