@@ -20,9 +20,11 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
+from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-__all__ = ["call_field"]
+__all__ = ["call_field", "native_address", "native_call"]
 
 _DOUBLE = ir.DoubleType()
 _INT64 = ir.IntType(64)
@@ -51,3 +53,37 @@ def call_field(typingctx, address, count, phase, X, P, stride, F, J, Fp):  # typ
         return context.get_dummy_value()
 
     return signature, codegen
+
+
+def native_call(argument_types: tuple[Any, ...]) -> Any:
+    """An intrinsic ``call(address, arguments)`` of a compiled kernel that takes `argument_types` and returns a float64.
+
+    A kernel that calls another one directly contains a copy of it, which is optimised again; called by its address it
+    is compiled once. Arguments of any other types are a typing error, not a crash.
+    """
+
+    @intrinsic
+    def call(typingctx, address, arguments):  # type: ignore[no-untyped-def]
+        if tuple(arguments.types) != argument_types:
+            raise TypingError(f"the kernel takes {argument_types}, not {arguments.types}")
+
+        def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
+            convention = context.call_conv
+            values = cgutils.unpack_tuple(builder, args[1], len(argument_types))
+            kind = convention.get_function_type(types.float64, argument_types)
+            pointer = builder.inttoptr(args[0], kind.as_pointer())
+            status, result = convention.call_function(builder, pointer, types.float64, argument_types, values)
+            with cgutils.if_unlikely(builder, status.is_error):
+                convention.return_status_propagate(builder, status)
+            return result
+
+        return types.float64(types.int64, arguments), codegen
+
+    return call
+
+
+def native_address(kernel: Any, argument_types: tuple[Any, ...]) -> int:
+    """Address of a kernel compiled (or loaded from the cache) for these types."""
+    kernel.compile(argument_types)
+    result = kernel.overloads[argument_types]
+    return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))

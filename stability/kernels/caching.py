@@ -11,8 +11,11 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
 import os
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -28,6 +31,10 @@ _EVERYTHING_A_DAMAGED_FILE_RAISES = (
 
 class _GuardedCache(FunctionCache):
     """numba's function cache; a damaged entry is removed and treated as absent."""
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        """A kernel holds copies of the kernels it calls: an entry is good only for the same sources of all of them."""
+        return (*super()._index_key(sig, codegen), _sources(self._py_func.__module__))
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
@@ -59,6 +66,22 @@ def _unpickling_errors() -> tuple[type[Exception], ...]:
     import pickle
 
     return (pickle.UnpicklingError,)
+
+
+@functools.cache
+def _sources(module: str) -> str:
+    """Digest of a kernel module and of the kernel modules it takes functions from."""
+    names, waiting = set(), [module]
+    while waiting:
+        name = waiting.pop()
+        if name not in names and name in sys.modules:
+            names.add(name)
+            owners = (getattr(value, "__module__", None) for value in vars(sys.modules[name]).values())
+            waiting += [owner for owner in owners if isinstance(owner, str) and owner.startswith(__package__ + ".")]
+    digest = hashlib.blake2b(digest_size=16)
+    for name in sorted(names):
+        digest.update(Path(str(sys.modules[name].__file__)).read_bytes())
+    return digest.hexdigest()
 
 
 def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False) -> Any:

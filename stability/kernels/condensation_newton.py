@@ -15,16 +15,42 @@ Forced systems (`period` address not 0): T = T(p) with its gradient, so the para
 
 from __future__ import annotations
 
-import numpy as np
+import functools
 
-from stability.kernels.addresses import call_field
+import numpy as np
+from numba import types
+
+from stability.kernels.addresses import call_field, native_address, native_call
 from stability.kernels.caching import kernel
 from stability.kernels.condensation import condense
 from stability.kernels.condensation_reduced import reduce_and_solve
 
-__all__ = ["CONVERGED", "NOT_FINITE", "NO_CONVERGENCE", "SINGULAR", "evaluate", "newton"]
+__all__ = ["CONVERGED", "NOT_FINITE", "NO_CONVERGENCE", "SINGULAR", "evaluate", "newton", "solvers"]
 
 CONVERGED, NO_CONVERGENCE, SINGULAR, NOT_FINITE = 0, 1, 2, 3
+
+
+def _array(dimensions, dtype=types.float64, constant=False):  # type: ignore[no-untyped-def]
+    return types.Array(dtype, dimensions, "C", readonly=constant)
+
+
+_RULE = (_array(2, constant=True), _array(2, constant=True), _array(1, constant=True), _array(1, constant=True))
+_INDICES = _array(1, types.int64)
+_CONDENSE = (
+    *_RULE, _array(1), types.float64, _array(3), _INDICES, _INDICES, _array(3), _array(3), _array(2, types.int64),
+    _array(3), _array(3),
+)  # fmt: skip
+_REDUCE = (
+    _RULE[3], _array(3), _array(3), _array(3), _array(3), _array(3), _array(3), _array(2), _array(2, constant=True),
+    types.int64, _array(2),
+)  # fmt: skip
+_condense, _reduce_and_solve = native_call(_CONDENSE), native_call(_REDUCE)
+
+
+@functools.cache
+def solvers() -> tuple[int, int]:
+    """Addresses of `condense` and `reduce_and_solve` for `newton`; they stay compiled as long as their modules."""
+    return native_address(condense, _CONDENSE), native_address(reduce_and_solve, _REDUCE)
 
 
 @kernel(inline=True)
@@ -159,7 +185,8 @@ def _columns(own, arc, free, h, sigma, span, F, Fp, dT, stage, node, columns, no
 
 @kernel
 def newton(  # type: ignore[no-untyped-def]
-    field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales, weights, stage_weights,
+    solvers, field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales, weights,
+    stage_weights,
     P, free, u, nodes, Y, T, arc, t, t_Y, t_l, weight_l, ds, tolerance, max_iterations,
     F, J, Fp, dT, LU, pivots, Z, M,
 ):  # fmt: skip
@@ -205,9 +232,13 @@ def newton(  # type: ignore[no-untyped-def]
             if r == own:
                 value += weights[last] * t[last] * moved_T * own + pull * moved_l - ds
             corner[r, at_rhs] = -value
-        sign = condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, pivots, Z, M)
+        sign = _condense(
+            solvers[0], (W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, pivots, Z, M)
+        )
         if sign != 0.0:
-            sign *= reduce_and_solve(update, Z, M, columns, node_columns, rows, node_rows, corner, S, arc, x)
+            sign *= _reduce_and_solve(
+                solvers[1], (update, Z, M, columns, node_columns, rows, node_rows, corner, S, arc, x)
+            )
         if sign == 0.0:
             status = SINGULAR
             break

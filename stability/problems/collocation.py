@@ -260,8 +260,9 @@ class Collocation(OrbitDiscretisation):
         weights = self.weights if mesh is self.mesh else self.raised_weights
         rule = mesh.rule
         status, iterations, residual, sign, x = kernels.newton(
-            self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.matrix,
-            rule.row_sums, rule.update, self.kept, self.position, self.closure, self.winding, self.scales, weights,
+            kernels.solvers(), self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h,
+            rule.inverse, rule.matrix, rule.row_sums, rule.update, self.kept, self.position, self.closure,
+            self.winding, self.scales, weights,
             mesh.split(weights)[1], params, index, u, nodes, stages, work.T, arc, t, mesh.split(t)[1], t_l, weight,
             float(ds), float(tolerance), limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU,
             work.pivots, work.Z, work.M,

@@ -478,3 +478,15 @@ def test_trouble_is_reported_not_raised():
     right = np.ones((problem.size, 1))
     assert np.isnan(L.solve(np.zeros((0, problem.size)), np.zeros((problem.size, 0)), np.zeros((0, 0)), right)).all()
     assert problem.spectrum(L).verdict is Verdict.UNDETERMINED
+
+
+def test_systems_of_python_functions():
+    """The same fold from a Python function (derivatives by differences, period by a callback) as from equations."""
+
+    def oscillator(time, x, *, xi=0.02, beta=0.05, Omega=2.0):
+        return np.array([x[1], -2 * xi * x[1] - x[0] - beta * x[0] ** 3 + Omega**2 * np.cos(Omega * time)])
+
+    system = st.System.from_function(oscillator, states="u u_dot", period=lambda Omega: 2 * np.pi / Omega)
+    branch = st.continuation(Collocation(system), "Omega", (3.0, 1.2))
+    assert abs(branch["LP1"].params["Omega"] - 1.416368134) < 2e-9
+    assert Collocation(system).spec["view_only"]
