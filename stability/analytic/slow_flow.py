@@ -13,6 +13,7 @@ References: Krylov and Bogoliubov, Introduction to Non-linear Mechanics (1947); 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from ..errors import EquationError, InputError
@@ -222,7 +223,9 @@ def _no_resonance(
         dict(resonance) if isinstance(resonance, Mapping) else f"{resonance[0]}:{resonance[1]}" if resonance else None
     )
     advice = "; order=2 may show more" if order == 1 else ""
+    form = standard_form(system, order, resonance, small)
+    answers = ", ".join(f"{c} at {Fraction(K, form.ratio[0])}" for c, K in zip(system.coordinates, form.multiples))
     return InputError(
-        f"'{system.name}' has no resonance {shown} to order {order}: the forcing does not enter its slow flow; it has "
-        f"{listing}{advice}"
+        f"'{system.name}' has no resonance {shown} to order {order}: the forcing does not enter its slow flow "
+        f"(response over excitation frequency: {answers}); it has {listing}{advice}"
     )

@@ -125,6 +125,11 @@ def graded_rows(
     return [{k: monomials(e, states) for k, e in f.items() if k <= step * number} for f in found], step
 
 
+def slowest_forcing(rows: Iterable[Mapping[Fraction, list[Monomial]]]) -> int:
+    """The greatest common divisor of the harmonics that occur: a declared period may be a multiple of the least one."""
+    return math.gcd(*(t.harmonic for row in rows for terms in row.values() for t in terms)) or 1
+
+
 def root(system: System, stiffness: sp.Expr) -> sp.Expr:
     """The natural frequency sqrt(stiffness); parameters with a positive default count as positive, sqrt(q^2) = q."""
     positive = {symbol(name): sp.Dummy(name, positive=True) for name, value in system.parameters.items() if value > 0}
@@ -157,16 +162,21 @@ def standard_form(system: System, order: int, resonance: Resonance, small: Small
         forcings.append(forcing)
     ratio, multiples = _multiples(system, stiffness, resonance)
     forced = system.period_expression is not None
-    base = 2 * sp.pi / system.period_expression / ratio[0] if forced else root(system, stiffness[0]) / multiples[0]
+    common = slowest_forcing(found)
+    base = (
+        common * 2 * sp.pi / system.period_expression / ratio[0]
+        if forced
+        else root(system, stiffness[0]) / multiples[0]
+    )
     levels = []
     for level in range(1, order + 1):
         rows = []
         for row in found:
             terms = [t for o, ts in row.items() if (level - 1) * step < o <= level * step for t in ts]
-            rows.append(tuple(dataclasses.replace(t, harmonic=t.harmonic * ratio[0]) for t in terms))
+            rows.append(tuple(dataclasses.replace(t, harmonic=t.harmonic // common * ratio[0]) for t in terms))
         levels.append(tuple(rows))
     hard = [
-        _linear_response(system, i, forcing, ratio[0], multiples[i], base, stiffness[i])
+        _linear_response(system, i, forcing, sp.Rational(ratio[0], common), multiples[i], base, stiffness[i])
         for i, forcing in enumerate(forcings)
     ]
     return StandardForm(system, base, multiples, tuple(stiffness), tuple(levels), tuple(hard), ratio)
@@ -255,14 +265,20 @@ def _multiples(
 
 
 def _linear_response(
-    system: System, i: int, forcing: Mapping[int, sp.Expr], scale: int, multiple: int, base: sp.Expr, stiffness: sp.Expr
+    system: System,
+    i: int,
+    forcing: Mapping[int, sp.Expr],
+    scale: sp.Rational,
+    multiple: int,
+    base: sp.Expr,
+    stiffness: sp.Expr,
 ) -> dict[int, tuple[sp.Expr, sp.Expr]]:
     """Harmonic m >= 0 -> (cosine, sine) coefficients of the response h_i to forcing of order 0."""
     found = {}
     for m, value in forcing.items():
         if m < 0 or value == 0:
             continue
-        harmonic = m * scale
+        harmonic = int(m * scale)
         if harmonic == multiple:
             name = system.coordinates[i]
             amplitude = sp.simplify(2 * value)

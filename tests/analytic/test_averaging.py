@@ -8,6 +8,9 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import subprocess
+import sys
 import warnings
 
 import numpy as np
@@ -183,6 +186,63 @@ def test_superharmonic_of_soft_excitation_needs_hard_forcing_or_order_two():
     with pytest.raises(InputError, match=r"no resonance 1:2 to order 1.*1:1"):
         st.averaging(system, small=("e", "F"), resonance=(1, 2))
     assert st.averaging(system, small=dict(e=1), resonance=(1, 2)).rhs[1].has(F)
+
+
+INTERNAL = {
+    "1:1": (1.0, {"x": (1, 1), "y": (1, 1)}, e * x * y**2 + e * x.diff(t) * y * y.diff(t), e * y * x**2 + e * x**3),
+    "1:3": (9.0, {"x": (1, 1), "y": (1, 3)}, e * x**2 * y + e * x * y**2, e * x**3 + e * x.diff(t) ** 3 + e * y**3),
+    "2:1": (0.25, {"x": (1, 1), "y": (2, 1)}, e * y**2 + e * y.diff(t) ** 2, e * x * y + e * x.diff(t) * y.diff(t)),
+    "3:2": (2.25, {"x": (2, 1), "y": (2, 3)}, e * x.diff(t), e * x * sp.cos(2 * w * t) + e * y**2 * x**2),
+}
+
+
+@pytest.mark.parametrize("name", INTERNAL)
+def test_two_degrees_of_freedom_are_averaged_over_the_common_period(name):
+    """Internal resonances 1:1, 1:3, 2:1, 3:2, by quadrature over the period of the slowest harmonic."""
+    stiffness, ratios, first, second = INTERNAL[name]
+    system = st.System.from_equations(
+        {x.diff(t, 2): -x - first + F * sp.cos(w * t), y.diff(t, 2): -stiffness * y - second}, [x, y],
+        parameters=dict(e=0.1, w=1.1, F=0.1),
+    )  # fmt: skip
+    slow = st.averaging(system, small=("e", "F"), resonance=ratios)
+    z = np.array([0.7, -0.2, 0.4, 0.5])
+    base = 2 * math.pi / system.period / 2  # all ratios here are multiples of a half
+    n, nu = 64, [base * 2 * q / p for p, q in ratios.values()]
+    times = 2 * math.pi / base * (np.arange(n) + 0.5) / n
+    phases = np.outer(nu, times)
+    q = z[::2, None] * np.cos(phases) + z[1::2, None] * np.sin(phases)
+    rates = np.array(nu)[:, None] * (-z[::2, None] * np.sin(phases) + z[1::2, None] * np.cos(phases))
+    g = system(times, np.vstack([q, rates]))[2:] + np.array(nu)[:, None] ** 2 * q
+    wanted = (
+        np.column_stack([-np.mean(g * np.sin(phases), axis=1), np.mean(g * np.cos(phases), axis=1)])
+        / np.array(nu)[:, None]
+    )
+    assert slow(0.0, z) == pytest.approx(wanted.ravel(), abs=1e-13)
+
+
+def test_declared_period_may_be_a_multiple_of_the_least_one():
+    once = st.System.from_equations(
+        {x.diff(t, 2): -x - e * x**3 + F * sp.cos(w * t)}, [x], parameters=dict(e=0.1, w=1.0, F=0.1)
+    )
+    twice = once.replace(period_expression=4 * sp.pi / w)
+    for options in (dict(small=("e", "F")), dict(small="e", resonance=(3, 1))):
+        assert st.averaging(once, **options).rhs == st.averaging(twice, **options).rhs
+
+
+def test_same_slow_flow_in_every_process():
+    """The digest does not depend on the hash seed."""
+    code = "import stability as st; print(st.averaging(st.models.autoparametric_quadratic(), order=2).digest)"
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", code],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for seed in ("1", "77")
+    }
+    assert len(found) == 1
 
 
 def test_ratios_by_coordinate_name():
