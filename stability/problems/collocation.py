@@ -54,7 +54,7 @@ def _plain(array: Array) -> Array:
     return np.array(array, float, order="C")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Collocation(OrbitDiscretisation):
     """Periodic orbits of a system, forced or autonomous, as a continuation problem.
 
@@ -210,6 +210,14 @@ class Collocation(OrbitDiscretisation):
         """(N,) of the inner product: zero at the nodes."""
         nodes = np.zeros((self.mesh.intervals + 1, self.mesh.n))
         return self.mesh.join(nodes, self.quadrature, self.period_scale**-2)
+
+    def __repr__(self) -> str:
+        periods = f", {self.multiple} forcing periods" if self.multiple > 1 else ""
+        return f"Collocation of '{self.system.name}', {self._size_in_words}{periods}"
+
+    @property
+    def _size_in_words(self) -> str:
+        return f"{self.mesh.intervals} intervals of degree {self.degree}"
 
     @property
     def spec(self) -> Mapping[str, Any]:

@@ -39,7 +39,7 @@ _DENSE_DEGREE = 7
 _MAX_ITERATIONS = {True: 30, False: 8}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Shooting(OrbitDiscretisation):
     """Periodic orbits of a system as a continuation problem, by shooting.
 
@@ -117,6 +117,14 @@ class Shooting(OrbitDiscretisation):
     def weights(self) -> Array:
         """(N,) mean square over the segments in units of the scales."""
         return self.packed(np.tile(self.scales**-2 / self.segments, (self.segments, 1)), self.period_scale**-2)
+
+    def __repr__(self) -> str:
+        periods = f", {self.multiple} forcing periods" if self.multiple > 1 else ""
+        return f"Shooting of '{self.system.name}', {self._size_in_words}{periods}"
+
+    @property
+    def _size_in_words(self) -> str:
+        return f"{self.segments} segment{'s' * (self.segments > 1)}"
 
     @property
     def spec(self) -> Mapping[str, Any]:
