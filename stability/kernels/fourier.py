@@ -6,7 +6,8 @@ A real periodic function of the phase s in [0, 1) is kept as coefficients (2H + 
 
 With N equispaced samples: synthesis x = G c, analysis c = G+ x (exact for harmonics up to (N - 1)/2), derivative by the
 angle 2 pi s: c -> D c. Multiplication by a function j(s), projected on the same harmonics, is the matrix
-T(j) = G+ diag(j) G, made of the harmonics of j up to 2H (N >= 4H + 1 samples hold them; the basis asks for one harmonic more) by
+T(j) = G+ diag(j) G, made of the harmonics of j up to 2H (N >= 4H + 1 samples hold them; the basis asks for one harmonic
+more) by
 
     cos i cos j = (cos(i-j) + cos(i+j)) / 2   and its like:    T = Toeplitz + Hankel.
 
@@ -164,7 +165,8 @@ def fourier_basis(harmonics: int, samples: int) -> FourierBasis:
     G = series(H, s)
     slope = np.ascontiguousarray(G[:, swap] * turn)
     first, second = _toeplitz_hankel(H)
-    arrays = (s, G, slope, np.ascontiguousarray(double[: 2 * H + 1]), k.astype(float), swap, turn, double, first, second)
+    analysis = np.ascontiguousarray(double[: 2 * H + 1])
+    arrays = (s, G, slope, analysis, k.astype(float), swap, turn, double, first, second)
     for array in arrays:
         array.setflags(write=False)
     return FourierBasis(H, N, *arrays)

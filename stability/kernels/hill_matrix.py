@@ -1,16 +1,16 @@
 r"""Hill's matrix of a linear periodic system and its Floquet exponents; the Koopman form of the monodromy matrix.
 
-y' = A(t) y with A of frequency omega; y = exp(lambda t) p(t), p periodic, gives p' + lambda p = A p. With the series of p
-cut off after H harmonics (real coefficients, harmonic by harmonic, states inside) that is the matrix eigenproblem
+y' = A(t) y with A of frequency omega; y = exp(lambda t) p(t), p periodic, gives p' + lambda p = A p. With the series of
+p cut off after H harmonics (real coefficients, harmonic by harmonic, states inside) that is the matrix eigenproblem
 
     ( T(A) - omega D ) p = lambda p,        size n (2H + 1).
 
-Every exponent appears as lambda + i m omega, m = -H .. H (its mode shifted by m harmonics), the outer ones spoilt by the
-truncation. *Selection*: multipliers mu = exp(lambda T) are wanted once each. Sorting by the imaginary part takes those of
-one strip of width omega; a strip -omega/2 .. omega/2 cuts through exponents at half the frequency (mu < 0, period-2
-tongues), of which it may keep both copies of one and lose another. Here the strip is -c < Im <= omega - c with the edge c
-put where no exponent is near, and eigenvectors decide where the count is not n: those centred nearest to harmonic zero
-(weighted mean) come first, a copy of one that is taken already is skipped.
+Every exponent appears as lambda + i m omega, m = -H .. H (its mode shifted by m harmonics), the outer ones spoilt by
+the truncation. *Selection*: multipliers mu = exp(lambda T) are wanted once each. Sorting by the imaginary part takes
+those of one strip of width omega; a strip -omega/2 .. omega/2 cuts through exponents at half the frequency (mu < 0,
+period-2 tongues), of which it may keep both copies of one and lose another. Here the strip is -c < Im <= omega - c with
+the edge c put where no exponent is near, and eigenvectors decide where the count is not n: those centred nearest to
+harmonic zero (weighted mean) come first, a copy of one that is taken already is skipped.
 
 *Koopman-Hill*: with z_m = y exp(-i m omega t), z' = Hill z, z(0) = (y(0), y(0), ...): Phi(T) = C exp(Hill T) W, no
 eigenvalues, no sorting; it converges with H, from the outside in. The subharmonic form uses the matrix of frequency
@@ -68,7 +68,7 @@ def selected(
     im = values.imag / omega
     near = im[np.abs(im) < 1.6]
     edges = [(float(min(np.abs(near + c).min(), np.abs(near - (1 - c)).min())), c) for c in _EDGES] if near.size else []
-    best = max((min(gap, 0.04), c) for gap, c in edges)[1] if edges else 0.5
+    best = max((min(gap, 0.02), c) for gap, c in edges)[1] if edges else 0.5
     inside = np.flatnonzero((im > -best) & (im <= 1 - best))
     if len(inside) == n:
         return inside, True

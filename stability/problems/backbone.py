@@ -1,14 +1,15 @@
 r"""Nonlinear normal modes by amplitude: `Backbone`.
 
-The periodic motions of the free system (backbone_system) x'' = <f>(x, x') + g x' with harmonics 0 .. H; unknowns are the
-coefficients c, the period T and the growth g, and two linear conditions fix phase and amplitude A of one coordinate x:
+The periodic motions of the free system (backbone_system) x'' = <f>(x, x') + g x' with harmonics 0 .. H; unknowns are
+the coefficients c, the period T and the growth g, and two linear conditions fix phase and amplitude A of one coordinate
+x:
 
     of="fundamental":   b_1 = 0,            a_1 = A           (first harmonic A cos omega t),
     of="max":           sum k b_k = 0,      sum a_k = A       (x(0) = A is a turning point, mean included).
 
 The first follows a response at phase resonance, the second compares with exact solutions: for u'' + u + beta u^3 = 0
-omega = pi sqrt(1 + z) / (2 K(m)), z = beta A^2, m = z / (2 (1 + z)) with A the largest displacement. g is the damping that
-a forcing in phase with the velocity would have to balance (extended periodic motion concept), g = 0 without damping.
+omega = pi sqrt(1 + z) / (2 K(m)), z = beta A^2, m = z / (2 (1 + z)) with A the largest displacement. g is the damping
+that a forcing in phase with the velocity would have to balance (extended periodic motion concept); 0 without damping.
 
 Reference: M. Krack (2015), Computers & Structures 154, 59-71; M. Krack, J. Gross (2019), chapter 2.
 """
@@ -189,7 +190,7 @@ class Backbone:
         """From the linear mode about the equilibrium, or from an array u or a periodic orbit."""
         amplitude = float(params[-1])
         if not amplitude > 0:
-            raise InputError(f"amplitude = {amplitude:g}: a backbone starts at a positive amplitude (0.01, for example)")
+            raise InputError(f"amplitude = {amplitude:g}: a backbone starts at a positive amplitude, such as 0.01")
         if isinstance(guess, np.ndarray) and guess.shape == (self.size,):
             u = np.array(guess, float)
         elif callable(guess) and hasattr(guess, "period"):

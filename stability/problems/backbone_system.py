@@ -2,10 +2,10 @@ r"""The free system behind a forced one: forcing averaged away, a uniform growth
 
     x'' = f(x, x', t)   ->   x'' = <f>(x, x') + g x',        <f> = 1/T int_0^T f dt at fixed x, x'.
 
-Additive forcing has mean zero and goes; parametric terms keep their mean. g (1/time) is the artificial, mass-proportional
-growth of the extended periodic motion concept: 2 xi for a linear damper of one degree of freedom, 0 for conservative
-systems. Reference: M. Krack (2015), Nonlinear modal analysis of nonconservative systems, Computers & Structures 154,
-59-71.
+Additive forcing has mean zero and goes; parametric terms keep their mean. g (1/time) is the artificial,
+mass-proportional growth of the extended periodic motion concept: 2 xi for a linear damper of one degree of freedom, 0
+for conservative systems. Reference: M. Krack (2015), Nonlinear modal analysis of nonconservative systems, Computers &
+Structures 154, 59-71.
 """
 
 from __future__ import annotations

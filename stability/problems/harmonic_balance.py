@@ -4,13 +4,13 @@ r"""Periodic orbits by harmonic balance: `HarmonicBalance`.
 
 put into x' = f(t, x, p) and projected on the same 2H + 1 functions (Galerkin). Forced systems: T = k T_f(p), k the
 `subharmonic`, so that harmonic k of the orbit is the forcing; autonomous ones: T is an unknown, with the integral phase
-condition. Velocities that are exactly x' = v are eliminated (harmonic_layout). The projection is computed from N samples
-in time (alternating frequency-time): for polynomials of degree d in the states N > (d + 1) H makes it exact, for other
-terms the aliasing is measured and N grows (harmonic_truncation). The Jacobian is exact (harmonic_linearisation).
+condition. Velocities that are exactly x' = v are eliminated (harmonic_layout). The projection is computed from N
+samples in time (alternating frequency-time): for polynomials of degree d in the states N > (d + 1) H makes it exact,
+for other terms the aliasing is measured and N grows (harmonic_truncation). The Jacobian is exact.
 
 Stability: Hill's eigenproblem of the same truncated system, checked against the monodromy matrix along the corrected
-orbit (harmonic_spectrum): folds of the truncated system are changes of its Hill exponents at every H, and a verdict that
-the check does not support is UNDETERMINED.
+orbit (harmonic_spectrum): folds of the truncated system are changes of its Hill exponents at every H, and a verdict
+that the check does not support is UNDETERMINED.
 
 Inner product: time average of the unknown states over their squared scales. Reference: M. Krack, J. Gross (2019),
 *Harmonic Balance for Nonlinear Vibration Problems*; T. Detroux et al. (2015), CMAME 296, 18-38.
@@ -27,7 +27,6 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-
 from ..kernels.gauss import gauss_rule
 from ..protocols import Corrected, Spectrum, Tangent
 from .harmonic_layout import HarmonicLayout
@@ -72,8 +71,8 @@ class HarmonicBalance(OrbitDiscretisation):
 
     Notes
     -----
-    *Accuracy*: `error` solves for the harmonics H + 1 .. 2H + 1 that the residual in time asks for, and for what they change
-    below; it is the largest such change of a state over its scale.
+    *Accuracy*: `error` solves for the harmonics H + 1 .. 2H + 1 that the residual in time asks for, and for what they
+    change below; it is the largest such change of a state over its scale.
 
     Examples
     --------
@@ -103,8 +102,8 @@ class HarmonicBalance(OrbitDiscretisation):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), 1, high))
         if self.own and self.subharmonic != 1:
             raise InputError(
-                f"subharmonic = {self.subharmonic}: '{self.system.name}' is autonomous and has no forcing period to be a "
-                "multiple of; leave subharmonic=1 (a doubled orbit comes from switch at a period doubling)"
+                f"subharmonic = {self.subharmonic}: '{self.system.name}' is autonomous and has no forcing period to be "
+                "a multiple of; leave subharmonic=1 (a doubled orbit comes from switch at a period doubling)"
             )
         fewest = self.harmonics if self.fewest is None else whole_number("fewest", self.fewest, 1, self.harmonics)
         object.__setattr__(self, "fewest", fewest)
@@ -155,7 +154,9 @@ class HarmonicBalance(OrbitDiscretisation):
     def exact_samples(self) -> bool:
         """Whether the samples are exact for the equations' degree, so that there is no aliasing to measure."""
         degree = polynomial_degree(self.system)
-        return degree is not None and self.samples >= first_samples(self.system, self.harmonics, self.subharmonic, degree)
+        if degree is None:
+            return False
+        return self.samples >= first_samples(self.system, self.harmonics, self.subharmonic, degree)
 
     @cached_property
     def phase(self) -> Array:
@@ -179,7 +180,8 @@ class HarmonicBalance(OrbitDiscretisation):
     @cached_property
     def column_sizes(self) -> Array:
         """(N,) sizes of the unknowns."""
-        return np.append(self.layout.repeated(self.scales[self.layout.unknowns]).ravel(), [self.period_scale] * self.own)
+        sizes = self.layout.repeated(self.scales[self.layout.unknowns])
+        return np.append(sizes.ravel(), [self.period_scale] * self.own)
 
     @cached_property
     def row_sizes(self) -> Array:

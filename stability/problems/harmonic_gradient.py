@@ -1,14 +1,16 @@
 r"""Exact gradients of w^T S v and w^T M v of a harmonic-balance problem, for the defining systems of special points.
 
-With the adjoint samples W_i of w (w^T G+ f = sum W_i . f_i), the variation z_v = (dX_v, v_p) of states and parameters at
-the samples and y = J^T W, the core's scalar g = w^T dF[v] changes by
+With the adjoint samples W_i of w (w^T G+ f = sum W_i . f_i), the variation z_v = (dX_v, v_p) of states and parameters
+at the samples and y = J^T W, the core's scalar g = w^T dF[v] changes by
 
     dg[u] = w^T d2Lin[v, u] - sum W . f_zz[z_v, z_u] - sum y_vel . ( v_omega x_u' + u_omega x_v' ),
 
-because velocities omega x' are products of two unknowns. For M = Re Y exp(Lambda T) Y^-1 made of selected modes of Hill's
-matrix (all modes V, inverse U): first-order perturbation of values and vectors gives w^T dM v = sum_ab G_ab dHill_ab,
+because velocities omega x' are products of two unknowns. For M = Re Y exp(Lambda T) Y^-1 made of selected modes of
+Hill's matrix (all modes V, inverse U): first-order perturbation of values and vectors gives w^T dM v = sum_ab G_ab
+dHill_ab,
 
-    G = U^T C V^T,   C_ij = (w^T(mu_j - M) P V_i) b_j / (lambda_j - lambda_i),   C_jj = T mu_j (w^T P V_j) b_j,   b = Y^-1 v,
+    G = U^T C V^T,   C_ij = (w^T(mu_j - M) P V_i) b_j / (lambda_j - lambda_i),   C_jj = T mu_j (w^T P V_j) b_j,   b =
+    Y^-1 v,
 
 and dHill is made of f_zz at the samples and of domega. One batched call of second derivatives each.
 """
@@ -132,7 +134,8 @@ def _second(L: HarmonicLinearisation, direction: Array) -> Array:
         return np.zeros((width, count, L.X.shape[1]))
     units = np.repeat(np.diag(sizes), count, axis=0)
     values = L.problem.evaluations.second(
-        np.tile(L.problem.phase, width), np.tile(L.X, (width, 1)), L.params, np.tile(direction / length, (width, 1)), units
+        np.tile(L.problem.phase, width), np.tile(L.X, (width, 1)), L.params, np.tile(direction / length, (width, 1)),
+        units
     )
     return np.asarray(values.reshape(width, count, -1) * (length / sizes)[:, None, None])
 

@@ -87,7 +87,7 @@ class HarmonicLinearisation:
 
     @cached_property
     def phase_row(self) -> Array:
-        """(N,) of the phase condition: weights . dc_ref/dtheta, normalised, with the reference orbit (its own if none)."""
+        """(N,) of the phase condition: weights . dc_ref/dtheta, normalised; reference: its own where none is given."""
         problem, layout = self.problem, self.problem.layout
         u = self.u if self.reference is None else self.reference
         slope = derivative(u[:-1].reshape(layout.count, layout.q))
@@ -135,7 +135,7 @@ class HarmonicLinearisation:
     def _omega_column(self) -> Array:
         """dR/domega at fixed coefficients, (size,)."""
         layout = self.problem.layout
-        places, velocities = layout.pairs
+        velocities = layout.pairs[1]
         values = self._linear(self.c, self.omega, 1)
         if len(velocities):
             part = np.einsum("kij,kj->ki", self.J[:, layout.rows][:, :, velocities], self.X[:, velocities])

@@ -2,8 +2,8 @@ r"""How many samples in time the projection needs.
 
 A term of degree d in the states and with harmonics up to m of the forcing in its coefficients has harmonics up to
 d H + m of the orbit; on N samples those up to H are exact for N > (d + 1) H + m, and those up to 2H + 1, from which
-the truncation is judged, for N > (d + 2) H + m + 1. Terms that are not polynomials have no such number: N starts at 8 H and
-grows while twice the samples change the projection (`aliasing`).
+the truncation is judged, for N > (d + 2) H + m + 1. Terms that are not polynomials have no such number: N starts at 8 H
+and grows while twice the samples change the projection (`aliasing`).
 """
 
 from __future__ import annotations

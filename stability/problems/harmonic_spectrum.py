@@ -13,14 +13,15 @@ with the left ones (rows of their inverse) the two-sided Rayleigh quotient
     lambda = w^T Hill v / w^T v
 
 differs from Hill's eigenvalue by the product of both residuals. Where that bound is not below 1e-10, a Hill matrix of
-order up to 140 is solved whole and its exponents are selected (kernels/hill_matrix); beyond, the bound joins the error. Twice the difference between the two sets of multipliers
-is the error estimate: truncation of orbit and of modes both. A verdict that it does not support is UNDETERMINED.
+order up to 140 is solved whole and its exponents are selected (kernels/hill_matrix); beyond, the bound joins the error.
+Twice the difference between the two sets of multipliers is the error estimate: truncation of orbit and of modes both. A
+verdict that it does not support is UNDETERMINED.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -42,6 +43,7 @@ Array = np.ndarray
 _DEGREE = 5
 _BOUND = 1e-10
 _WHOLE = 140  # order of the largest Hill matrix that is solved whole at an ordinary point
+_SMALL = 0.3
 _APART = 1e-2  # autonomous: nearer multipliers to 1 than this are left to the whole problem
 
 
@@ -170,7 +172,11 @@ def propagated(L: HarmonicLinearisation, found: Correction) -> Propagation | Non
     trace = np.einsum("kii->k", J).reshape(S, -1) @ rule.weights
     growth = np.exp(found.period / S * float(trace.sum()))
     defect = abs(float(np.linalg.det(fundamental[-1])) - growth) / max(1.0, growth)
-    return Propagation(fundamental[:-1], fundamental[-1], F[0], defect)
+    rate = F[0]
+    if problem.own:
+        start = layout.states(found.coefficients, 2 * np.pi / found.period, np.zeros(1))
+        rate = problem.evaluations.F(None, start, L.params)[0]
+    return Propagation(fundamental[:-1], fundamental[-1], rate, defect)
 
 
 def _refined(L: HarmonicLinearisation, along: Propagation) -> tuple[Array, Array, float] | None:
@@ -252,7 +258,7 @@ def checked_spectrum(L: HarmonicLinearisation) -> Spectrum:
             others, values, bound = refined
             error = 2 * spectrum_distance(values, others) + bound + _floor(along) + (_drift(L, along) if own else 0.0)
             return orbit_spectrum(_ordered(values), error)
-    values, certain = _whole_values(L)
+    values = _whole_values(L)
     if along is None or not np.isfinite(values).all():
         return orbit_spectrum(values, np.inf)
     M, error = along.monodromy * problem.scales / problem.scales[:, None], _floor(along)
@@ -261,7 +267,7 @@ def checked_spectrum(L: HarmonicLinearisation) -> Spectrum:
         error += drift
     others = eigenvalues(M)
     error += 2 * max(spectrum_distance(values, others), spectrum_distance(others, values))
-    return orbit_spectrum(values, error)
+    return orbit_spectrum(_with_small_ones(values, others), error)
 
 
 def _drift(L: HarmonicLinearisation, along: Propagation) -> float:
@@ -280,20 +286,26 @@ def _ordered(values: Array) -> Array:
     return np.asarray(values[np.lexsort((-values.imag, -np.abs(values).round(14)))])
 
 
-def _whole_values(L: HarmonicLinearisation) -> tuple[Array, bool]:
+def _with_small_ones(values: Array, others: Array) -> Array:
+    """Values, with those far inside the circle taken from `others`: large ones spoil them in a product of modes."""
+    mixed = np.concatenate([values[np.abs(values) >= _SMALL], others[np.abs(others) < _SMALL]])
+    return mixed if len(mixed) == len(values) else values
+
+
+def _whole_values(L: HarmonicLinearisation) -> Array:
     """Multipliers from Hill's matrix solved whole, the trivial one removed by the direction of the flow."""
     modes, problem = L.modes, L.problem
     if not np.isfinite(modes.monodromy).all():
-        return np.full(problem.layout.n - problem.own, np.nan, complex), False
+        return np.full(problem.layout.n - problem.own, np.nan, complex)
     if not problem.own:
-        return eigenvalues(modes.monodromy), modes.certain
+        return eigenvalues(modes.monodromy)
     velocity = problem.evaluations.F(None, np.ascontiguousarray(L.X[:1]), L.params)[0]
-    return eigenvalues(deflated(modes.monodromy, velocity / problem.scales)[0]), modes.certain
+    return eigenvalues(deflated(modes.monodromy, velocity / problem.scales)[0])
 
 
 # ---------------------------------------------------------------------- for users and tests
 def independent_multipliers(problem: HarmonicBalance, u: Array, params: Array) -> dict[str, Array]:
-    """Multipliers (n,) by three methods: "hill", "koopman" (subharmonic form), "monodromy"; all of them, trivial too."""
+    """Multipliers (n,), the trivial one too, by three methods: "hill", "koopman" (subharmonic form), "monodromy"."""
     L = problem.linearise(u, params)
     n, H = problem.layout.n, problem.harmonics
     out: dict[str, Array] = {"hill": eigenvalues(L.modes.monodromy)}

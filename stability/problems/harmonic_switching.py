@@ -1,8 +1,8 @@
 r"""From a period doubling of a harmonic-balance orbit to the problem of twice the period.
 
 Harmonic k of the orbit is harmonic 2k of the doubled one; the new motion has the odd harmonics. To first order it is
-antiperiodic over the old period, so its direction is the null vector of the doubled problem's Jacobian restricted to odd
-harmonics (even and odd ones do not mix at the orbit itself), which is Hill's matrix at lambda = i omega / 2.
+antiperiodic over the old period, so its direction is the null vector of the doubled problem's Jacobian restricted to
+odd harmonics (even and odd ones do not mix at the orbit itself), which is Hill's matrix at lambda = i omega / 2.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 r"""How good a truncated Fourier series is, and how many harmonics and samples it should have.
 
-The residual in time of the truncated orbit, f(X) - x', has harmonics H + 1, H + 2, ... Those up to K = 2H + 1 are used. One Newton step in them, with the mean
-of the Jacobian (Z_k = (i k omega)^r - J_0, a small system per harmonic), gives the harmonics that are missing; their
-effect J dX on the equations of the first H, and what is left of their own residual, solved with the exact Jacobian,
-gives the change of those. Where a tangent
+The residual in time of the truncated orbit, f(X) - x', has harmonics H + 1, H + 2, ... Those up to K = 2H + 1 are used.
+One Newton step in them, with the mean of the Jacobian (Z_k = (i k omega)^r - J_0, a small system per harmonic), gives
+the harmonics that are missing; their effect J dX on the equations of the first H, and what is left of their own
+residual, solved with the exact Jacobian, gives the change of those. Where a tangent
 of the branch is known the change is taken orthogonally to it, so that a fold does not blow it up. The largest change of
 a state over its scale is the error estimate; for terms that are no polynomials the residual is taken on twice as many
 samples, so that the estimate contains the aliasing, whose share is told apart (`aliasing`).
@@ -149,7 +149,7 @@ def _lower_states(L: HarmonicLinearisation, delta: Array, d_omega: float) -> Arr
 
 
 def _lower_step(L: HarmonicLinearisation, force: Array) -> Array | None:
-    """F_u x = force, orthogonally to the branch where its tangent is known, else of least length where F_u is singular."""
+    """F_u x = force, orthogonal to the branch where its tangent is known, else of least length if F_u is singular."""
     problem = L.problem
     sides = force.shape[1]
     if problem.own:
@@ -168,7 +168,7 @@ def _lower_step(L: HarmonicLinearisation, force: Array) -> Array | None:
 
 # ---------------------------------------------------------------------- what to do about it
 def missing_harmonics(found: Correction, accuracy: float) -> int:
-    """How many more harmonics bring the error below `accuracy`, by the decay of the sizes; at least 1, at most 1000 (no power law is trusted further).
+    """How many more harmonics bring the error below `accuracy`, by the decay of the sizes: 1 to 1000.
 
     0 where the error is small enough already.
     """
@@ -202,9 +202,8 @@ def adapted(
     harmonics = _wanted_harmonics(problem, found._replace(error=worst)) if problem.adaptive else problem.harmonics
     if harmonics != problem.harmonics:
         fields["harmonics"] = harmonics
-    elif not problem.fixed_samples and found.aliasing > _ALIAS * found.error and found.aliasing > _ROUNDING:
-        if problem.samples < _MOST_SAMPLES * harmonics:
-            fields["samples"] = 2 * problem.samples
+    elif not problem.fixed_samples and found.aliasing > max(_ALIAS * found.error, _ROUNDING):
+        fields |= {"samples": 2 * problem.samples} if problem.samples < _MOST_SAMPLES * harmonics else {}
     if not problem.adaptive or harmonics >= _MOST:
         warn_of_truncation(problem, found._replace(error=worst), params)
     if not fields:
