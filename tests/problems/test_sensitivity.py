@@ -92,7 +92,7 @@ def test_tip_of_a_tongue_by_the_envelope_theorem():
         """(place, depth) of the minimum, by a polynomial through seven solved points."""
         doubling = st.continuation(st.Collocation(system.with_params(delta=delta)), "a", (-0.1, 0.4))["PD1"]
         curve = st.continuation(st.locus(doubling, free="b"), "a", (-0.1, 0.6))
-        near = curve.columns["a"][np.argmin(curve.columns["b"])] + 2e-2 * np.arange(-3, 4)
+        near = curve.columns["a"][np.argmin(curve.columns["b"])] + 4e-3 * np.arange(-3, 4)
         fit = np.polynomial.Polynomial.fit(near, [curve.at(a=x)[0].params["b"] for x in near], 6)
         place = min(fit.deriv().roots().real, key=lambda x: abs(x - near[3]))
         return curve, float(place), float(fit(place))
