@@ -63,6 +63,10 @@ class Backbone:
         Harmonics grow where the estimated error exceeds `accuracy`.
     accuracy : float
         Wanted error of the states over their scales.
+    amplitude : float
+        Default of the parameter "amplitude".
+    inner : HarmonicBalance, optional
+        The free system's discretisation; made here, and changed by `adapt`.
 
     Raises
     ------
@@ -80,7 +84,7 @@ class Backbone:
     >>> import stability as st
     >>> curve = st.continuation(st.Backbone(st.models.duffing(beta=0.1)), "amplitude", (0.01, 1.0))
     >>> round(float(curve.columns["omega"][-1]), 5)
-    1.03687
+    1.03693
     """
 
     system: Any

@@ -63,6 +63,8 @@ class HarmonicBalance(OrbitDiscretisation):
         Wanted error of the states over their scales; None: 1e-8 where adaptive, else 1e-3.
     winding : mapping of angle -> whole number of turns per orbit, or array (n,) in radians
     scales, period_scale : sizes of the states (n,) and of the period; by default 1, then set by `adapt`.
+    fewest : int, optional
+        Harmonics below which adaption does not go; by default `harmonics`.
 
     Raises
     ------

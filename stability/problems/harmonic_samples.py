@@ -45,7 +45,7 @@ def first_samples(system: Any, harmonics: int, subharmonic: int, degree: int | N
 
     >>> import stability as st
     >>> first_samples(st.models.duffing(), 7, 1)
-    38
+    40
     """
     if degree is None:
         known = polynomial_degree(system)
