@@ -203,16 +203,15 @@ def newton(  # type: ignore[no-untyped-def]
     rows, node_rows = np.empty((own + arc, intervals, size)), np.empty((own + arc, intervals + 1, n))
     corner, stage, node = np.empty((own + arc, own + 2)), np.empty((intervals, size)), np.empty((intervals + 1, n))
     columns, node_columns = np.empty((intervals, size, own + 2)), np.empty((intervals + 1, n, own + 2))
-    _borders(own, arc, W, h, stage_weights, weights[last], nodes, Y, t_Y, t[last], pull, rows, node_rows, corner)
-    moved = np.empty((intervals, size))  # from the given stages
-    moved_T, moved_l = ds * t[last] * arc, ds * t_l * arc
-    for j in range(intervals):
-        for k in range(size):
-            moved[j, k] = ds * t_Y[j, k] * arc
-    for k in range(count):
-        u[k] += ds * t[k] * arc
-    P[free] += moved_l
     x = np.empty((2, count + arc))
+    _borders(own, arc, W, h, stage_weights, weights[last], nodes, Y, t_Y, t[last], pull, rows, node_rows, corner)
+    moved = np.zeros((intervals, size))  # from the given stages
+    moved_T, moved_l = ds * t[last] * arc, ds * t_l * arc
+    for k in range(count):
+        x[0, k] = t[k]
+        u[k] += ds * t[k] * arc
+    _shift(moved, x, ds * arc, (intervals + 1) * n)
+    P[free] += moved_l
     status, sign, residual, previous, iterations = NO_CONVERGENCE, 0.0, np.inf, np.inf, 0
     while iterations < max_iterations:
         iterations += 1
@@ -232,13 +231,10 @@ def newton(  # type: ignore[no-untyped-def]
             if r == own:
                 value += weights[last] * t[last] * moved_T * own + pull * moved_l - ds
             corner[r, at_rhs] = -value
-        sign = _condense(
-            solvers[0], (W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, pivots, Z, M)
-        )
+        sign = _condense(solvers[0], (W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, pivots, Z, M))
         if sign != 0.0:
-            sign *= _reduce_and_solve(
-                solvers[1], (update, Z, M, columns, node_columns, rows, node_rows, corner, S, arc, x)
-            )
+            arguments = (update, Z, M, columns, node_columns, rows, node_rows, corner, S, arc, x)
+            sign *= _reduce_and_solve(solvers[1], arguments)
         if sign == 0.0:
             status = SINGULAR
             break
