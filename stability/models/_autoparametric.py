@@ -232,13 +232,15 @@ def from_physical(
         mass1="kg", mass2="kg", stiffness="N/m", damping="N s/m", length="m", pendulum_damping="N m s/rad",
         y="m", phi="rad", y_mm="mm", phi_deg="deg", **({"g": "m/s^2"} if gravity else {}),
     )  # fmt: skip
-    return physical_system(
+    system = physical_system(
         "autoparametric_pendulum", "mass on a spring that carries a pendulum, SI units", kinetic - potential, [y, phi],
         {**values, **({"g": GRAVITY} if gravity else {})},
         base=base, dissipation=d * v**2 / 2 + D * w**2 / 2,
         forces={y: (m1 + m2) * base.load, phi: m2 * lp * base.load * sp.sin(phi)},
         units=units, outputs=dict(y_mm=1000 * y, phi_deg=180 * phi / sp.pi), angles=("phi",), coil=coil,
     )  # fmt: skip
+    small = dict(damping=1, pendulum_damping=1, y=1, phi=1)
+    return system.replace(orders={**small, system.base.parameter: 2} if system.base else small)
 
 
 @model(

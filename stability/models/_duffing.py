@@ -68,7 +68,8 @@ def duffing(*, xi: float = 0.02, beta: float = 0.001, Omega: float = 1.0, gravit
         parameters=dict(xi=xi, beta=beta, Omega=Omega, gravity=gravity),
         bounds=dict(Omega=_POSITIVE),
         outputs=dict(u_absolute=u + sp.cos(W * t)),
-        orders=dict(xi=1, beta=3, gravity=1, u=-1),  # the base motion is 1, the response at resonance 1/eps
+        # the base motion is 1, the response at resonance and a static deflection that is not zero are 1/eps
+        orders=dict(xi=1, beta=3, gravity=-1 if gravity else 1, u=-1),
         name="duffing",
         description="Duffing's oscillator on a moving base",
     )
@@ -119,13 +120,14 @@ def from_physical(
     if amplitude is None and acceleration is None:
         acceleration = 0.5 * 9.81
     k1, k3 = sp.symbols("stiffness cubic", real=True)
-    return single_degree(
+    system = single_degree(
         "duffing", "Duffing's oscillator on a moving base, SI units",
         lambda y: k1 * y**2 / 2 + k3 * y**4 / 4,
         {"stiffness": stiffness, "cubic": cubic}, {"stiffness": "N/m", "cubic": "N/m^3"},
         mass=mass, damping=damping, amplitude=amplitude, acceleration=acceleration, frequency=frequency,
         gravity=gravity, coil=coil,
     )  # fmt: skip
+    return system.replace(orders=dict(damping=1, cubic=1, **{system.base.parameter: 1}) if system.base else {})
 
 
 @model(

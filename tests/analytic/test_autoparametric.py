@@ -121,15 +121,16 @@ def test_nontrivial_amplitudes(detuned, order_R, order_r):
     assert_order(errors_r, order_r, slack=0.25 if detuned else 0.12, small=small)
 
 
+@pytest.mark.parametrize("method", [st.averaging, st.multiple_scales])
 @pytest.mark.parametrize("detuned", [False, True])
-def test_second_order_of_the_averaged_flow(detuned):
+def test_second_order_of_the_averaged_flow(detuned, method):
     """One order better than row 5b: the mean of x and the 3/2 harmonic of y are there."""
     small = (0.1, 0.05, 0.025)
     errors = []
     for e in small:
         v = scaled(e, detuned=detuned)
         _, state = equilibrium(v)
-        slow = st.averaging(st.models.autoparametric_quadratic(**v), resonance=(2, 1), order=2)
+        slow = method(st.models.autoparametric_quadratic(**v), resonance=(2, 1), order=2)
         point = st.solve(st.Equilibrium(slow), start=state)
         period = 4 * math.pi / v["eta"]
         _, rows = periodic_orbit(full_field(v), period, st.reconstruct(slow, point, 0.0))

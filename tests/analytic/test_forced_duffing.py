@@ -195,6 +195,27 @@ def test_peak_under_base_excitation():
     assert np.isnan(st.duffing_frequencies(1.1 * top, xi=0.02, beta=limit * 0.99)).all()
 
 
+def test_first_order_is_one_term_harmonic_balance():
+    """Folds of `HarmonicBalance(harmonics=1)` and of the averaged branch are the same numbers."""
+    model = st.models.duffing(xi=0.02, beta=0.001)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StabilityWarning)  # one harmonic is too few, and says so
+        balanced = st.continuation(st.HarmonicBalance(model, harmonics=1), "Omega", (0.3, 3.0))
+    slow = st.continuation(st.Equilibrium(st.averaging(model)), "Omega", (0.3, 3.0))
+    for label in ("LP1", "LP2"):
+        assert balanced[label].params["Omega"] == pytest.approx(slow[label].params["Omega"], abs=1e-9)
+
+
+def test_static_deflection_stiffens():
+    """gravity: the frequency of small motion is 1 + 3 beta u_s^2 with u_s = -gravity, and the cubic's drift is in h(t)."""
+    heavy = st.models.duffing(xi=0.001, beta=1e-4, gravity=20.0)
+    slow = st.averaging(heavy)
+    value = slow.with_params(Omega=1.0)(0.0, [1e-3, 0.0])[1] - slow.with_params(Omega=1.0)(0.0, [0.0, 0.0])[1]
+    assert value / 1e-3 == pytest.approx(-3 * 1e-4 * 20.0**2 / 2, rel=1e-6)
+    assert float(st.reconstruct(slow, [0.0, 0.0], 0.0)[0]) == pytest.approx(-20.0)
+    assert "gravity" not in str(st.averaging(st.models.duffing()).rhs)
+
+
 def test_stability_changes_at_the_vertical_tangents_only():
     branch = st.continuation(st.Equilibrium(st.averaging(st.models.duffing(xi=0.02, beta=0.001))), "Omega", (0.3, 3.0))
     assert [p.kind for p in branch.special] == [st.Kind.FOLD, st.Kind.FOLD]
