@@ -26,7 +26,7 @@ __all__ = ["Changes", "Dip", "changes", "crossed", "dip_of", "double_turn", "sup
 
 
 _LOST = 0.1  # an error of multipliers (eigenvalues: relative to the largest) beyond which counts mean nothing
-_STILL = 1e-8  # a scaled rate of the parameter that is rounding
+_STILL = 1e-10  # a scaled rate of the parameter that is rounding
 
 
 class Changes(NamedTuple):

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 _PAIRS = (Kind.HOPF, Kind.NEIMARK_SACKER)
 _AMBIGUOUS = 10  # halvings after which the simplest explanation of a change is taken
 _EDGE = 1e-6  # how far outside its bracket, in units of the bracket, a located point may lie
+_ONE_PLACE = 2e-4  # scaled distance below which a fold and a branch point of one parameter value are one
 _UNFOLDING = 1e-10  # a perturbed crossing is no branch point: its unfolding parameter is not zero
 _SIGNATURE = 1e-5  # how close to the limit the critical value of a located point must be
 
@@ -253,9 +254,9 @@ def _is_turning_crossing(change: Changes, located: list[Found], length: float) -
         return False
     weight = crossing.tangent.weight
     if fold is None:
-        return abs(crossing.tangent.parameter) * weight < 1e-3
+        return length < _ONE_PLACE and abs(crossing.tangent.parameter) * weight < 1e-3
     gap = abs(fold.s - crossing.s)
-    return abs(fold.parameter - crossing.parameter) * weight < 1e-8 and gap < min(2e-4, 0.1 * length + 1e-7)
+    return abs(fold.parameter - crossing.parameter) * weight < 1e-8 and gap < min(_ONE_PLACE, 0.1 * length + 1e-7)
 
 
 def _secant(ga: float, gb: float) -> float:

@@ -142,7 +142,10 @@ class Equilibrium:
     def linearise(self, u: Array, params: Array) -> DenseLinearisation:
         """f, f_x, f_p at (u, params)."""
         F, J, Fp = self.evaluations.FJP(_NO_PHASE, u[None, :], params)
-        return DenseLinearisation(self, u, params, F[0], J[0], Fp[0])
+        return self._linearisation(u, params, F[0], J[0], Fp[0])
+
+    def _linearisation(self, u: Array, params: Array, F: Array, J: Array, Fp: Array) -> DenseLinearisation:
+        return DenseLinearisation(self, u, params, F, J, Fp)
 
     def spectrum(self, linearisation: Any) -> Spectrum:
         """Eigenvalues of the Jacobian; their error is 1e-13 of its norm."""
@@ -210,7 +213,7 @@ class Equilibrium:
         residual = float(np.max(np.abs(final) / (np.abs(J) @ (np.abs(u) + s) + 1e-300)))
         if not math.isfinite(residual):
             return self._failed(u, params, iterations, final, J)
-        linearisation = DenseLinearisation(self, u, params, F, J, Fp)
+        linearisation = self._linearisation(u, params, F, J, Fp)
         return Corrected(u, params, new, residual, iterations, int(sign), linearisation, True)
 
     def _failed(self, u: Array, params: Array, iterations: int, F: Array, J: Array) -> Corrected:

@@ -88,7 +88,7 @@ class DenseLinearisation:
         n, q = self.F.size, columns.shape[1]
         s = self.problem.scales
         K = np.empty((n + q, n + q))
-        K[:n, :n] = self.spectral
+        K[:n, :n] = self.core
         K[:n, n:] = columns / s[:, None]
         K[n:, :n] = rows * s
         K[n:, n:] = corner
