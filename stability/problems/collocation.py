@@ -70,7 +70,9 @@ class Collocation(OrbitDiscretisation):
     winding : mapping of angle -> whole number of turns per orbit, or array (n,) in radians
         x(end) = x(0) + 2 pi k for the angles a system declares.
     symmetry : (n, n) array, optional
-        S of x(t + k T/2) = S x(t): the orbit is solved on half of its period.
+        S of x(t + k T/2) = S x(t), S S = I: the orbit is solved on half of its period. The multipliers are those of the
+        half-period map S^-1 Phi(T/2): -1 is the loss of the symmetry (a pitchfork of the whole orbit), not a doubling,
+        although the branch labels it PD.
     accuracy : float
         Wanted error of the nodes over the states' scales; `adapt` chooses the number of intervals for it.
     adaptive : bool
