@@ -20,8 +20,8 @@ from ..systems.equations import TIME
 
 __all__ = ["HARMONIC", "Monomial", "Rough", "monomials", "with_harmonics"]
 
-HARMONIC = sp.Symbol("E", real=True)  # only a placeholder: real keeps sympy from splitting moduli
-_INVERSE = sp.Symbol("E_inverse", real=True)
+HARMONIC = sp.Dummy("E", real=True)  # only placeholders: real keeps sympy from splitting moduli
+_INVERSE = sp.Dummy("E_inverse", real=True)
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ def _not_averaged(term: sp.Expr, why: str) -> EquationError:
 
 def readable(term: sp.Expr) -> str:
     """A term with e^{i w t} in words."""
-    return str(term).replace("E_inverse", "exp(-i w t)").replace("E**", "exp(i w t)**")
+    return str(term.xreplace({HARMONIC: sp.Symbol("exp(i w t)"), _INVERSE: sp.Symbol("exp(-i w t)")}))
 
 
 def forcing_of(terms: Iterable[Monomial]) -> dict[int, sp.Expr]:

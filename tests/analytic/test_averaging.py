@@ -229,6 +229,40 @@ def test_declared_period_may_be_a_multiple_of_the_least_one():
         assert st.averaging(once, **options).rhs == st.averaging(twice, **options).rhs
 
 
+def test_names_of_the_workings_are_free_for_users():
+    """A parameter may be called E, A0 or M0, a coordinate B0."""
+    B0 = sp.Function("B0", real=True)(t)
+    E, A0, M0 = sp.symbols("E A0 M0", real=True)
+    named = st.System.from_equations(
+        {B0.diff(t, 2): -B0 - E * B0**3 - M0 * B0.diff(t) + A0 * sp.cos(w * t)}, [B0],
+        parameters=dict(E=0.1, A0=0.1, M0=0.02, w=1.0),
+    )  # fmt: skip
+    plain = oscillator(e * x**3 + b * x.diff(t), b=0.02, w=1.0)
+    for order in (1, 2):
+        mine = st.averaging(named, small=("E", "A0", "M0"), order=order)
+        other = st.averaging(plain, small=("e", "F", "b"), order=order)
+        assert mine(0.0, [0.6, -0.4]) == pytest.approx(other(0.0, [0.6, -0.4]), abs=1e-15)
+
+
+@pytest.mark.parametrize("amplitude", [1e-4, 3e-4])
+def test_physical_pendulum_is_the_dimensionless_one(amplitude):
+    """y = A u, t = tau/w1: the two averaged flows in each other's units."""
+    physical = st.models.autoparametric_pendulum.from_physical(amplitude=amplitude, frequency=22.0, length=0.0022)
+    p = physical.parameters
+    mass = p["mass1"] + p["mass2"]
+    w1, w2 = math.sqrt(p["stiffness"] / mass), math.sqrt(p["g"] / p["length"])
+    model = st.models.autoparametric_pendulum(
+        xi1=p["damping"] / (2 * mass * w1), xi2=p["pendulum_damping"] / (2 * p["mass2"] * p["length"] ** 2 * w2),
+        mass_ratio_total=p["mass2"] / mass, length_ratio=p["length"] / amplitude, Omega0=w2 / w1,
+        Omega=2 * math.pi * p["frequency"] / w1,
+    )  # fmt: skip
+    for order in (1, 2):
+        mine, other = st.averaging(physical, order=order), st.averaging(model, order=order)
+        z = np.array([20.0, -7.0, 0.3, 0.1])
+        units = np.array([amplitude, amplitude, 1.0, 1.0])
+        assert mine(0.0, units * z) / (units * w1) == pytest.approx(other(0.0, z), rel=1e-11, abs=1e-13)
+
+
 def test_same_slow_flow_in_every_process():
     """The digest does not depend on the hash seed."""
     code = "import stability as st; print(st.averaging(st.models.autoparametric_quadratic(), order=2).digest)"
