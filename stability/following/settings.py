@@ -115,6 +115,11 @@ def checked(
         raise InputError(f"the window of '{name}' must be two numbers (from, to), got {window!r}") from None
     if not (math.isfinite(first) and math.isfinite(last)) or first == last:
         raise InputError(f"the window of '{name}' must be two different finite numbers, got ({first}, {last})")
+    lowest, highest = getattr(getattr(problem, "system", None), "bounds", {}).get(name, (-math.inf, math.inf))
+    if not lowest <= min(first, last) <= max(first, last) <= highest:
+        raise InputError(
+            f"the window ({first:g}, {last:g}) leaves the bounds [{lowest:g}, {highest:g}] of the parameter '{name}'"
+        )
     longest = 0.2 if ds_max is None else _number("ds_max", ds_max, 0.0)
     step = min(0.01, longest) if ds is None else _number("ds", ds, 0.0)
     if step > longest:

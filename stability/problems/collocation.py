@@ -30,6 +30,7 @@ from ..kernels import condensation_newton as kernels
 from ..kernels.condensation_reduced import monodromy_product
 from ..kernels.meshes import uniform_edges
 from ..protocols import Corrected, Spectrum, Tangent
+from ..systems.stops import refuse_stops
 from .collocation_error import multiplier_error, node_error
 from .collocation_linearisation import CollocationLinearisation, Workspace
 from .orbit_adaption import adapted
@@ -109,6 +110,7 @@ class Collocation(OrbitDiscretisation):
     _memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
+        refuse_stops(self.system, "Collocation")
         n = self.system.n
         for name, low, high in (("degree", 1, 11), ("intervals", 1, _MAX_INTERVALS), ("multiple", 1, 64)):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), low, high))

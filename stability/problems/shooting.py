@@ -27,6 +27,7 @@ from ..errors import ConvergenceError, InputError, NonFiniteError
 from ..integration.flow import flow
 from ..kernels.gauss import gauss_rule
 from ..protocols import Corrected, Spectrum, Tangent
+from ..systems.stops import refuse_stops
 from .orbit_adaption import state_scales
 from .orbit_spectrum import contracted, deflated, eigenvalues, orbit_spectrum, spectrum_distance
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
@@ -80,6 +81,7 @@ class Shooting(OrbitDiscretisation):
     _memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
+        refuse_stops(self.system, "Shooting")
         for name, high in (("segments", 1000), ("multiple", 64)):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), 1, high))
         for name in ("rtol", "atol"):

@@ -9,10 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
 
-__all__ = ["HardStop"]
+if TYPE_CHECKING:
+    from .system import System
+
+__all__ = ["HardStop", "refuse_stops"]
 
 
 @dataclass(frozen=True)
@@ -54,3 +58,12 @@ class HardStop:
             raise InputError(f"side must be +1 (bounds from above) or -1 (from below); got {self.side}")
         if not 0.0 <= self.restitution <= 1.0:
             raise InputError(f"restitution must be in [0, 1]; got {self.restitution}")
+
+
+def refuse_stops(system: System, method: str) -> None:
+    """InputError where a method would pass through a system's hard stops without seeing them."""
+    if system.stops:
+        raise InputError(
+            f"{method} does not see the hard stops of '{system.name}' and would pass through them; use simulate or "
+            "sweep, or a model with soft stops (models.soft_stop_oscillator)"
+        )
