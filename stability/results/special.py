@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib import import_module
 from types import MappingProxyType
 from typing import Any
@@ -39,7 +40,7 @@ class SpecialPoint:
     multipliers : (n,) complex, multipliers of an orbit or eigenvalues of an equilibrium
     bracket : (float, float), values of the continued parameter at the points between which it was found
     accuracy : float, last Newton update in the scaled norm (the error left is about its square)
-    criticality : Criticality or None;  coefficient : float or None, of the normal form
+    criticality : Criticality or None;  coefficient : float or None, of the normal form (computed when first asked for)
     free : str, the continued parameter
     u, direction : (N,) the problem's unknowns there and the direction of the branch in them;  rate : float, the
         parameter's part of the direction
@@ -58,8 +59,7 @@ class SpecialPoint:
     source: Any = field(repr=False)  # the problem, or its spec after `load`
     accuracy: float = 0.0
     name: str = ""
-    criticality: Criticality | None = None
-    coefficient: float | None = None
+    normal: tuple[float | None, Criticality | None] | None = field(default=None, repr=False)  # None: not computed yet
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "kind", Kind(self.kind))
@@ -68,8 +68,9 @@ class SpecialPoint:
             object.__setattr__(self, key, frozen(getattr(self, key), dtype))
         low, high = self.bracket
         object.__setattr__(self, "bracket", (float(low), float(high)))
-        if self.criticality is not None:
-            object.__setattr__(self, "criticality", Criticality(self.criticality))
+        if self.normal is not None:
+            coefficient, word = self.normal
+            object.__setattr__(self, "normal", (coefficient, None if word is None else Criticality(word)))
 
     @property
     def problem(self) -> Any:
@@ -85,6 +86,27 @@ class SpecialPoint:
     def params_vector(self) -> NDArray[np.float64]:
         """(m,) parameter values in the problem's order."""
         return np.array(list(self.params.values()))
+
+    @cached_property
+    def _normal_form(self) -> tuple[float | None, Criticality | None]:
+        if self.normal is not None:
+            return self.normal
+        module = import_module("stability.problems.criticality")
+        return module.criticality_of(self.problem, self.kind, np.array(self.u), self.params_vector)  # type: ignore[no-any-return]
+
+    @property
+    def criticality(self) -> Criticality | None:
+        """Where the new solutions live: SUPERCRITICAL (they attract), SUBCRITICAL, DEGENERATE; None: no such word.
+
+        Of Hopf, pitchfork, period-doubling and Neimark-Sacker points; of a fold only DEGENERATE (a cusp). Near the
+        strong resonances exp(i k theta) = 1, k <= 4, a torus coefficient does not decide: None.
+        """
+        return self._normal_form[1]
+
+    @property
+    def coefficient(self) -> float | None:
+        """The normal form's coefficient (problems/normal_forms.py says which), for |q| = 1 in the states' units."""
+        return self._normal_form[0]
 
     def sensitivity(self, of: str | None = None) -> Any:
         """How the place of this point moves with every other parameter: derivatives, ranked.
@@ -150,8 +172,9 @@ class SpecialPoint:
             raise FileFormatError(f"a special point's solution is of unknown type {stored.get('type')!r}")
         inner = {k.removeprefix("solution."): a for k, a in arrays.items() if k.startswith("solution.")}
         solution = _SOLUTIONS[stored["type"]].from_storage(stored, inner)
+        normal = (fields.pop("coefficient"), fields.pop("criticality"))
         own: dict[str, Any] = {k: arrays[k] for k in ("multipliers", "u", "direction")}
-        return cls(solution=solution, **own, **fields)
+        return cls(solution=solution, normal=normal, **own, **fields)
 
     def save(self, path: Any) -> None:
         """Write to a ``.npz`` file that `stability.load` reads."""

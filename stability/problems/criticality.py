@@ -1,0 +1,56 @@
+r"""From a located special point of any problem class to its normal form.
+
+Equilibria give the derivatives of their field, collocation those of its discrete period map; an orbit of another
+method (harmonic balance, shooting) is first solved again by collocation on its own period, from which the derivatives
+then come. See `normal_forms` for coefficients and words.
+
+*Accuracy*: derivatives are exact for the discrete problem; a coefficient is off by the relative discretisation error of
+the orbit. Systems given by Python functions have derivatives by differences: third ones are known to about 1e-4.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import StabilityError
+from ..words import Kind
+from .normal_forms import FieldForms, NormalForm, normal_form
+from .normal_forms_orbits import MapForms
+
+__all__ = ["criticality_of"]
+
+Array = NDArray[np.float64]
+_KINDS = (Kind.FOLD, Kind.BRANCH_POINT, Kind.HOPF, Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER)
+_NONE = NormalForm(None, None)
+
+
+def criticality_of(problem: Any, kind: Kind, u: Array, params: Array) -> NormalForm:
+    """Coefficient and word at a special point, (None, None) where nothing can be said; never raises for numerics."""
+    if kind not in _KINDS:
+        return _NONE
+    try:
+        forms = _forms(problem, u, params)
+        if forms is None or not np.isfinite(forms.matrix).all():
+            return _NONE
+        return normal_form(kind, forms, problem.critical.circle)
+    except (np.linalg.LinAlgError, StabilityError):
+        return _NONE
+
+
+def _forms(problem: Any, u: Array, params: Array) -> Any:
+    from .collocation import Collocation
+    from .equilibria import Equilibrium
+
+    if isinstance(problem, Equilibrium):
+        return FieldForms(problem.linearise(u, params))
+    if not isinstance(problem, Collocation):
+        if not hasattr(problem, "discretise"):
+            return None
+        orbit = problem.view(u, params)
+        multiple = int(getattr(problem, "subharmonic", getattr(problem, "multiple", 1)))
+        problem = Collocation(problem.system, multiple=multiple)
+        u = problem.start(params, orbit)
+    return MapForms(problem.linearise(u, params))
