@@ -7,17 +7,19 @@ figure where no axes are given.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError, unknown_name
-from ..words import Kind
+from ..words import Kind, Verdict
 from .style import SERIES, axis_label, line, marker
 
 if TYPE_CHECKING:
     from ..results.branch import Branch
     from ..results.solutions import PeriodicOrbit
+    from ..results.special import SpecialPoint
 
 __all__ = ["plot_branch", "plot_multipliers", "plot_orbit"]
 
@@ -65,7 +67,7 @@ def plot_branch(
     kinds : tuple of Kind or None
         Which special points to mark; None marks all but the points asked for by value.
     **style
-        Passed on to ``Axes.plot`` of the lines.
+        Passed on to ``Axes.plot`` of the lines; a ``label`` names the first stable stretch (or the first).
 
     Returns
     -------
@@ -83,29 +85,41 @@ def plot_branch(
     abscissa, ordinate = branch.columns[x], branch.columns[y]
     color = SERIES[0] if color is None else color
     artists: list[Any] = []
-    legend = style.pop("label", None)
-    for segment in branch.segments():
+    segments, legend = branch.segments(), style.pop("label", None)
+    named = next((k for k, s in enumerate(segments) if s.verdict is Verdict.STABLE), 0)
+    for k, segment in enumerate(segments):
         part = slice(segment.start, segment.stop)
         look = {**line(segment.verdict), "color": color, **style}
-        artists += ax.plot(abscissa[part], ordinate[part], label=legend, **look)
-        legend = None
+        artists += ax.plot(abscissa[part], ordinate[part], label=legend if k == named else None, **look)
+    for index, point in _marked(branch, kinds):
+        place = (float(abscissa[index]), float(ordinate[index]))
+        artists += ax.plot([place[0]], [place[1]], zorder=3, **marker(point.kind, color))
+        if labels:
+            artists.append(_written(ax, point.name or point.label, place, color))
+    ax.set_xlabel(axis_label(x))
+    ax.set_ylabel(axis_label(y))
+    return artists
+
+
+def _marked(branch: Branch, kinds: tuple[Kind, ...] | None) -> Iterator[tuple[int, SpecialPoint]]:
+    """(index, special point) of those that are drawn: all but values asked for, or those of some kinds."""
     for index, mark in enumerate(branch.marks.tolist()):
         if mark < 0:
             continue
         point = branch.special[mark]
-        wanted = point.kind is not Kind.USER or bool(point.name) if kinds is None else point.kind in kinds
-        if not wanted:
-            continue
-        place = (float(abscissa[index]), float(ordinate[index]))
-        artists += ax.plot([place[0]], [place[1]], zorder=3, **marker(point.kind, color))
-        if labels:
-            text = point.name or point.label
-            artists.append(
-                ax.annotate(text, place, xytext=(4, 4), textcoords="offset points", fontsize="small", color=color)
-            )
-    ax.set_xlabel(axis_label(x))
-    ax.set_ylabel(axis_label(y))
-    return artists
+        if (point.kind is not Kind.USER or bool(point.name)) if kinds is None else point.kind in kinds:
+            yield index, point
+
+
+def _written(ax: Any, text: str, place: tuple[float, float], color: str) -> Any:
+    """A label beside a point, with a white halo, so that it stays readable on a line."""
+    from matplotlib.patheffects import withStroke
+
+    halo = [withStroke(linewidth=1.5, foreground="white")]
+    return ax.annotate(
+        text, place, xytext=(4, 4), textcoords="offset points", fontsize="small", color=color, zorder=2.5,
+        path_effects=halo,
+    )  # fmt: skip
 
 
 def plot_orbit(

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 import stability as st
 from stability.errors import UnknownNameError
-from stability.plots.branches import plot_multipliers
+from stability.plots.branches import plot_branch, plot_multipliers
 from stability.plots.style import LINES, MARKERS
 
 
@@ -53,3 +53,45 @@ def test_eigenvalues_in_the_complex_plane() -> None:
     _, cloud, hopf = plot_multipliers(branch, ax)
     assert hopf.get_marker() == MARKERS[st.Kind.HOPF]
     assert set(np.round(hopf.get_ydata(), 9)) == {-1.0, 1.0} and cloud.get_xdata().size == 2 * len(branch)
+
+
+def test_multipliers_along_a_branch_and_at_its_special_points() -> None:
+    """A fold of the Duffing oscillator: a marker at +1; nothing is drawn beyond the limit, nothing on foreign axes."""
+    branch = st.continuation(st.Collocation(st.models.duffing(xi=0.02, beta=0.001)), "Omega", (0.9, 1.6))
+    figure = Figure()
+    ax, foreign = figure.subplots(1, 2)
+    circle, cloud, *marks = plot_multipliers(branch, ax, limit=1.2)
+    assert np.hypot(*circle.get_data()) == pytest.approx(1.0) and ax.get_aspect() == 1.0
+    drawn = np.hypot(*cloud.get_data())
+    assert np.nanmax(drawn) <= 1.2 < np.abs(branch.values).max() and not foreign.has_data()
+    assert [m.get_marker() for m in marks] == [MARKERS[st.Kind.FOLD]] * len(branch.special) and marks
+    assert all(np.abs(m.get_xdata() - 1.0).min() < 1e-6 for m in marks)
+
+
+def test_any_column_over_any_other_on_foreign_axes(branch: st.Branch) -> None:
+    """The parabola a = x^2 drawn the other way round; its label names the stable part only."""
+    ax = Figure().add_subplot()
+    lines = plot_branch(branch, ax, y="a", x="x", label="name", labels=False, color="#123456", kinds=())
+    assert [line.get_linestyle() for line in lines] == ["-", "--"] and {x.get_color() for x in lines} == {"#123456"}
+    for line in lines:
+        np.testing.assert_allclose(line.get_ydata(), line.get_xdata() ** 2, atol=1e-10)
+    assert ax.get_legend_handles_labels()[1] == ["name"] and lines[0].get_label() == "name"
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("$x$", "$a$")
+
+
+def test_a_branch_that_begins_unstable_is_named_by_its_stable_part(branch: st.Branch) -> None:
+    back = st.continuation(branch.meshes[0], "a", (2.0, -1.0), start=[-1.4])
+    first, second = plot_branch(back, Figure().add_subplot(), y="x", label="name", labels=False, kinds=())
+    assert (first.get_linestyle(), second.get_linestyle()) == ("--", "-")
+    assert second.get_label() == "name" and first.get_label() != "name"
+
+
+def test_an_orbit_is_drawn_in_the_states_asked_for() -> None:
+    orbit = st.PeriodicOrbit.from_function(("u", "v"), lambda t: np.array([np.cos(t), np.sin(2 * t)]), 2 * np.pi)
+    ax = Figure().add_subplot()
+    (drawn,) = orbit.plot(ax=ax, x="v", y="u", color="#654321")
+    v, u = drawn.get_data()
+    assert (v**2).tolist() == pytest.approx((4 * u**2 * (1 - u**2)).tolist(), abs=1e-9)
+    assert drawn.get_color() == "#654321" and ax.get_xlabel() == "$v$"
+    with pytest.raises(UnknownNameError):
+        orbit.plot(ax=ax, x="w")
