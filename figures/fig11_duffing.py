@@ -1,4 +1,4 @@
-"""Figure 11: the base-excited Duffing oscillator at 0.5 g: motion at 25 Hz from rest, and the swept response 5 ... 40 Hz.
+"""Figure 11: the base-excited Duffing oscillator at 0.5 g: motion at 25 Hz from rest, swept response 5 ... 40 Hz.
 
 Parameters [chosen]: m = 20 g, f1 = 20 Hz, k3 = 1.90e7 N/m3, d = 0.1365 N s/m; gravity off. 50 periods a point, the last
 5 recorded [given]; step 0.5 Hz [chosen]. Checked: the sweep jumps at the folds of continuation, 26.998 Hz (4.3016 mm)

@@ -1,9 +1,10 @@
 """Figure 13: the autoparametric absorber at 0.2 g, w = w1 = 2 w2: the pendulum takes the energy of the mass.
 
-Parameters: f = 22.22 Hz [given]; mass ratio 0.2, xi1 = xi2 = 0.021, phi(0) = 0.01 rad [chosen]; l = 2.0132 mm,
-A = 0.10066 mm, l/A = 20. Checked: |phi| first reaches pi after 7.526 periods; the pendulum then rotates irregularly
-(chaotic: no single number is checked there) and locks to an oscillation of 1.035 rad with twice the period of the base,
-while |u| falls from 23.8 with the pendulum blocked to 0.71; this orbit is the one that shooting finds, and it is stable.
+Parameters: f = 22.22 Hz [given]; mass ratio 0.2, xi1 = xi2 = 0.021, phi(0) = 0.01 rad [chosen]; l = 2.0132 mm, A =
+0.10066 mm, l/A = 20. Checked: |phi| first reaches pi after 7.526 periods; the pendulum then rotates irregularly
+(chaotic: no single number is checked there) and locks to an oscillation of 1.035 rad with twice the period of the
+base, while |u| falls from 23.8 with the pendulum blocked to 0.71; this orbit is the one that shooting finds, and it
+is stable.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ def compute() -> dict[str, Any]:
     settled = st.simulate(system, (0.0, 1500 * T), x0=dict(theta=0.01)).final
     settled[1] = np.mod(settled[1] + np.pi, 2 * np.pi) - np.pi
     found = problem.correct(settled, p, "Omega", None, 0.0, 1e-10)
-    return {"T": T, "motion": motion, "blocked": blocked, "converged": found.converged, "orbit": problem.view(found.u, p)}
+    orbit = problem.view(found.u, p)
+    return {"T": T, "motion": motion, "blocked": blocked, "converged": found.converged, "orbit": orbit}
 
 
 def first_turn(motion: Any) -> float:
@@ -63,8 +65,9 @@ def draw(data: dict[str, Any], path: Path) -> None:
     axes[1, 0].plot(shown.t / T, shown["theta"] / (2 * np.pi), color=style.SERIES[0], linewidth=0.8)
     turn = first_turn(motion) / T
     axes[1, 0].axvline(turn, color=style.COLOURS["vermilion"], linewidth=0.8, linestyle="--")
+    red = style.COLOURS["vermilion"]
     axes[1, 0].annotate(rf"$|\theta| = \pi$ after {turn:.3f} periods", (turn, 0.9), xytext=(6, 0), fontsize="small",
-                        xycoords=("data", "axes fraction"), textcoords="offset points", color=style.COLOURS["vermilion"])
+                        xycoords=("data", "axes fraction"), textcoords="offset points", color=red)
     axes[1, 0].set(xlim=(0, 100), xlabel="periods of the base", ylabel=r"$\theta/2\pi$ (turns)")
     orbit = data["orbit"]
     times = np.linspace(0, orbit.period, 801)

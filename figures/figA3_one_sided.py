@@ -1,10 +1,11 @@
 """Figure A3: the one-sided magnetic spring, swept at 0.5 g, and the same with a hard stop.
 
-Parameters: h0 = 1.1 mm, d/m = 20 1/s, m = 20 g [chosen]; 50 periods a point, 5 recorded. Checked: folds of continuation
-at 17.420 Hz and 22.781 Hz, largest peak to peak 3.654 mm at 17.53 Hz (the 3.65 mm of the chapter is peak to peak: free
-motion over a one-sided spring obeys f <= 1/(2 sqrt(2 H/g))), a smooth superharmonic of about 1 mm near 13.6 Hz; the
-sweeps jump behind the folds. With a stop of restitution 0.7 at y = 1.5 mm the peak is cut off; the sweep down touches it
-where the free response does (grazing, 24.25 Hz), the impacting motion of the sweep up lives on to 32.7 Hz.
+Parameters: h0 = 1.1 mm, d/m = 20 1/s, m = 20 g [chosen]; 50 periods a point, 5 recorded. Checked: folds of
+continuation at 17.420 Hz and 22.781 Hz, largest peak to peak 3.654 mm at 17.53 Hz (the 3.65 mm of the chapter is peak
+to peak: free motion over a one-sided spring obeys f <= 1/(2 sqrt(2 H/g))), a smooth superharmonic of about 1 mm near
+13.6 Hz; the sweeps jump behind the folds. With a stop of restitution 0.7 at y = 1.5 mm the peak is cut off; the sweep
+down touches it where the free response does (grazing, 24.25 Hz), the impacting motion of the sweep up lives on to
+32.7 Hz.
 """
 
 from __future__ import annotations

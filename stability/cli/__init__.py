@@ -30,6 +30,8 @@ COMMANDS: dict[str, str] = {
     "doctor": "Which 'stability' is imported, versions, back ends, caches.",
     "models": "List the catalogue, or describe one model.",
     "new": "Write a commented template of a model as text.",
+    "simulate": "Motion in time from given initial values.",
+    "sweep": "Response along a slow sweep, as on a shaker.",
     "plot": "Draw a stored chart, branch or orbit.",
 }
 _FILES = {"continue": "continuation"}  # a keyword of Python is no name of a module

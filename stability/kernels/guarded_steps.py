@@ -71,6 +71,73 @@ def _brackets(W, S, k, fresh, best):  # type: ignore[no-untyped-def]
     return 0, 0
 
 
+@kernel(inline=True)
+def _tabulate(guards, P, times, coefficients, j, signs, W, S, X, F, none, phase):  # type: ignore[no-untyped-def]
+    """Guards W (count, 9) and their slopes S over theta at nine points of step j."""
+    for q in range(2 * (_PARTS + 1)):
+        i = q // 2
+        theta = i / _PARTS
+        shift = _DELTA if i < _PARTS else -_DELTA
+        _look(guards, P, times, coefficients, j, theta + (q % 2) * shift, X, F, none, phase)
+        for k in range(signs.shape[0]):
+            if q % 2 == 0:
+                W[k, i] = signs[k] * F[0, k]
+            else:
+                S[k, i] = (signs[k] * F[0, k] - W[k, i]) / shift
+
+
+@kernel(inline=True)
+def _probed(guards, P, times, coefficients, j, k, sign, kind, low, high, X, F, none, phase):  # type: ignore[no-untyped-def]
+    """(found, low, high): a bracket of the root inside [low, high].
+
+    kind 2: golden section towards the minimum, until the guard is negative there; kind 3: halving from the right, until
+    it is positive.
+    """
+    left, right, other, least = low, high, -1.0, 0.0
+    for r in range(48):
+        if kind == 3:
+            probe = high * 0.5 ** (r + 1)
+        elif other < 0.0:
+            probe = right - _GOLDEN * (right - left)
+        else:
+            probe = left + right - other
+        _look(guards, P, times, coefficients, j, probe, X, F, none, phase)
+        value = sign * F[0, k]
+        if kind == 3:
+            if value > 0.0:
+                return True, probe, 2.0 * probe
+        elif value < 0.0:
+            return True, low, probe
+        elif other < 0.0:
+            other, least = probe, value
+        elif value < least:
+            if probe < other:
+                right = other
+            else:
+                left = other
+            other, least = probe, value
+        elif probe < other:
+            left = probe
+        else:
+            right = probe
+    return False, low, high
+
+
+@kernel(inline=True)
+def _bisected(guards, P, times, coefficients, j, k, sign, low, high, X, F, none, phase):  # type: ignore[no-untyped-def]
+    """theta where the guard turns negative, between low (not negative) and high (negative)."""
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        if middle <= low or middle >= high:
+            break
+        _look(guards, P, times, coefficients, j, middle, X, F, none, phase)
+        if sign * F[0, k] < 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
 @kernel
 def scan(guards, P, times, coefficients, size, count, signs, active, fresh):  # type: ignore[no-untyped-def]
     """(step, theta, guard, slope) of the first event in steps (K + 1,) (K, 8, n); guard -1: none; theta -1: not left.
@@ -81,87 +148,32 @@ def scan(guards, P, times, coefficients, size, count, signs, active, fresh):  # 
     W, S = np.empty((count, _PARTS + 1)), np.empty((count, _PARTS + 1))
     waiting = fresh.copy()
     for j in range(len(coefficients)):
-        for q in range(2 * (_PARTS + 1)):
-            i = q // 2
-            theta = i / _PARTS
-            shift = _DELTA if i < _PARTS else -_DELTA
-            _look(guards, P, times, coefficients, j, theta + (q % 2) * shift, X, F, none, phase)
-            for k in range(count):
-                if q % 2 == 0:
-                    W[k, i] = signs[k] * F[0, k]
-                else:
-                    S[k, i] = (signs[k] * F[0, k] - W[k, i]) / shift
-        best, which, hi = 2.0, -1, 0.0
+        _tabulate(guards, P, times, coefficients, j, signs, W, S, X, F, none, phase)
+        best, which = 2.0, -1
         for k in range(count):
-            if not active[k]:
-                continue
-            start = 0
-            while start >= 0:
+            while active[k]:
                 i, kind = _brackets(W, S, k, waiting[k], best)
-                start = -1
-                if kind == 0:
-                    break
                 low, high = i / _PARTS, (i + 1) / _PARTS
-                if kind == 2 or kind == 3:
-                    # kind 2: golden section for the minimum; kind 3: halving for a point above zero
-                    left, right = low, high
-                    probe, other, value_other, found = 0.0, -1.0, 0.0, False
-                    for r in range(48):
-                        if kind == 3:
-                            probe = high * 0.5 ** (r + 1)
-                        elif other < 0.0:
-                            probe = right - _GOLDEN * (right - left)
-                        else:
-                            probe = left + right - other
-                        _look(guards, P, times, coefficients, j, probe, X, F, none, phase)
-                        value = signs[k] * F[0, k]
-                        if kind == 3:
-                            if value > 0.0:
-                                low, high, found = probe, 2.0 * probe, True
-                                break
-                            continue
-                        if value < 0.0:
-                            high, found = probe, True
-                            break
-                        if other < 0.0:
-                            other, value_other = probe, value
-                        elif (probe < other) == (value < value_other):
-                            if probe < other:
-                                right = other
-                            else:
-                                right = probe
-                            if probe < other:
-                                other, value_other = probe, value
-                        else:
-                            if probe < other:
-                                left = probe
-                            else:
-                                left, other, value_other = other, probe, value
+                if kind >= 2:
+                    found, low, high = _probed(
+                        guards, P, times, coefficients, j, k, signs[k], kind, low, high, X, F, none, phase
+                    )
+                    if not found and kind == 3:
+                        return j, -1.0, k, 0.0
                     if not found:
-                        if kind == 3:
-                            return j, -1.0, k, 0.0
                         S[k, i] = 0.0  # no dip here: look further
-                        start = i
                         continue
-                if low < best:
-                    for _ in range(60):
-                        middle = 0.5 * (low + high)
-                        if middle <= low or middle >= high:
-                            break
-                        _look(guards, P, times, coefficients, j, middle, X, F, none, phase)
-                        if signs[k] * F[0, k] < 0.0:
-                            high = middle
-                        else:
-                            low = middle
-                    if high < best:
-                        best, which, hi = high, k, high
+                if kind > 0 and low < best:
+                    at = _bisected(guards, P, times, coefficients, j, k, signs[k], low, high, X, F, none, phase)
+                    if at < best:
+                        best, which = at, k
+                break
         if which >= 0:
-            before = hi - _DELTA
-            _look(guards, P, times, coefficients, j, before, X, F, none, phase)
-            value = signs[which] * F[0, which]
-            _look(guards, P, times, coefficients, j, hi, X, F, none, phase)
-            slope = (signs[which] * F[0, which] - value) / (_DELTA * (times[j + 1] - times[j]))
-            return j, hi, which, slope
+            slope = 0.0
+            for q in range(2):
+                _look(guards, P, times, coefficients, j, best - q * _DELTA, X, F, none, phase)
+                slope += (1.0 - 2.0 * q) * signs[which] * F[0, which]
+            return j, best, which, slope / (_DELTA * (times[j + 1] - times[j]))
         for k in range(count):
             if W[k, _PARTS] > 0.0:
                 waiting[k] = False
