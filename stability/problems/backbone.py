@@ -32,7 +32,7 @@ from ..words import Verdict
 from .backbone_linearisation import BackboneLinearisation
 from .backbone_system import GROWTH, driving_parameter, free_system
 from .harmonic_balance import HarmonicBalance
-from .harmonic_truncation import correction, missing_harmonics
+from .harmonic_truncation import missing_harmonics
 from .orbit_adaption import state_scales
 from .orbits import whole_number
 
@@ -309,12 +309,12 @@ class Backbone:
 
     def error(self, u: Array, params: Array) -> float:
         """Largest change of a state over its scale that the missing harmonics would make; inf: unknown."""
-        return correction(self.linearise(u, params).inner).error
+        return float(self.linearise(u, params).inner.correction.error)
 
     def adapt(self, u: Array, params: Array, tangent: Tangent | None) -> tuple[Backbone, Array, Tangent | None] | None:
         """More harmonics where the error asks for them, scales that follow the motion; or None."""
         L = self.linearise(u, params).inner
-        found, inner = correction(L), self.inner
+        found, inner = L.correction, self.inner
         scales, fields = state_scales(L.X), {}
         ratios = np.append(scales / inner.scales, L.period / inner.period_scale)
         if ((ratios > 2) | (ratios < 0.5)).any():
@@ -358,5 +358,5 @@ class Backbone:
             named[self.driving] = 2 * np.pi / period
         return PeriodicOrbit.from_nodes(
             self.system.states, edges * period, gauss_rule(degree).abscissae, values, named,
-            verdict=self.spectrum(L).verdict, error=correction(L.inner).error, residual=L.size_of_residual,
+            verdict=self.spectrum(L).verdict, error=L.inner.correction.error, residual=L.size_of_residual,
         )  # fmt: skip

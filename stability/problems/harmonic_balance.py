@@ -25,10 +25,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg.lapack import dgesv
 
 from ..errors import InputError
 from ..kernels.gauss import gauss_rule
 from ..protocols import Corrected, Spectrum, Tangent
+from ..systems.stops import refuse_stops
 from .harmonic_layout import HarmonicLayout
 from .harmonic_linearisation import HarmonicLinearisation
 from .harmonic_samples import first_samples, polynomial_degree
@@ -99,6 +101,7 @@ class HarmonicBalance(OrbitDiscretisation):
     _warned: set[str] = field(default_factory=set, repr=False)
 
     def __post_init__(self) -> None:
+        refuse_stops(self.system, "HarmonicBalance")
         n = self.system.n
         for name, high in (("harmonics", _MAX_HARMONICS), ("subharmonic", 64)):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), 1, high))
@@ -194,22 +197,6 @@ class HarmonicBalance(OrbitDiscretisation):
         sizes = self.layout.repeated(self.scales[self.layout.unknowns] * rate**order, by_order=True)
         return np.append(sizes.ravel(), [1.0] * self.own)
 
-    @cached_property
-    def stiffness(self) -> Array:
-        """(size,) k^2 at the coefficients of second order, else 0."""
-        k = self.layout.basis.k[:, None]
-        return np.asarray(np.where(self.layout.second, k * k, 0.0).ravel())
-
-    @cached_property
-    def first_order_entries(self) -> tuple[Array, Array, Array]:
-        """Rows, columns and values of D for the series of first order."""
-        q, H = self.layout.q, self.harmonics
-        series_at = np.flatnonzero(~self.layout.second)
-        k = np.repeat(np.arange(1, H + 1), len(series_at))
-        places = np.tile(series_at, H)
-        cosine, sine = (2 * k - 1) * q + places, 2 * k * q + places
-        return np.concatenate([cosine, sine]), np.concatenate([sine, cosine]), np.concatenate([k, -k]).astype(float)
-
     @property
     def spec(self) -> Mapping[str, Any]:
         """Plain data from which `from_spec` makes an equal problem."""
@@ -253,6 +240,9 @@ class HarmonicBalance(OrbitDiscretisation):
     # ------------------------------------------------------------------ the Newton solve
     def linearise(self, u: Array, params: Array) -> HarmonicLinearisation:
         """The linearisation at (u, params)."""
+        known = self._memo.get("last")
+        if known is not None and np.array_equal(known[0], u) and np.array_equal(known[1].params, params):
+            return known[1]  # type: ignore[no-any-return]
         return HarmonicLinearisation(self, np.array(u, float), np.array(params, float))
 
     def correct(
@@ -272,7 +262,7 @@ class HarmonicBalance(OrbitDiscretisation):
             if self.own and not u[-1] > 0:
                 note = "the period became negative"
                 break
-            L = HarmonicLinearisation(self, u.copy(), params.copy(), given if self.own else None)
+            L = HarmonicLinearisation(self, u.copy(), params.copy(), given if self.own else None, index)
             residual = L.size_of_residual
             if not residual < np.inf:
                 note = L.complaint
@@ -285,10 +275,11 @@ class HarmonicBalance(OrbitDiscretisation):
             else:
                 A[:size, size], A[size, :size], A[size, size] = column, row, pull
                 right[size] = ds - row @ (u - given) - pull * (params[index] - given_p[index]), 1.0
-            x = _solved(A, right, self._row_scales(border))
-            if x is None:
+            solved = factored(A * self._row_scales(border), right * self._row_scales(border))
+            if solved is None:
                 note = "singular"
                 break
+            x, factors = solved
             step = x[:size, 0]
             change_l = float(x[-1, 0]) if border else 0.0
             change = float(np.sqrt(w @ step**2 + ((tangent.weight * change_l) ** 2 if tangent is not None else 0.0)))
@@ -301,9 +292,10 @@ class HarmonicBalance(OrbitDiscretisation):
             u, params[index] = u + damping * step, params[index] + damping * change_l
             if change <= tolerance * (1 + length):
                 if change > _SETTLED * (1 + length):  # multipliers belong to the point itself, not to the last iterate
-                    L = HarmonicLinearisation(self, u.copy(), params.copy(), given if self.own else None)
+                    L = HarmonicLinearisation(self, u.copy(), params.copy(), given if self.own else None, index)
                     residual = L.size_of_residual
-                return self._corrected(u, params, x, tangent, residual, iteration, L, A, free)
+                self._memo["last"] = (u, L) if L.reference is None else None
+                return self._corrected(u, params, x, tangent, residual, iteration, L, factors)
             if tangent is not None and iteration > 1 and change > 2 * previous:
                 break
             previous = change
@@ -317,8 +309,10 @@ class HarmonicBalance(OrbitDiscretisation):
 
     def _corrected(
         self, u: Array, params: Array, x: Array, tangent: Tangent | None, residual: float, iterations: int,
-        L: HarmonicLinearisation, A: Array, free: str,
+        L: HarmonicLinearisation, factors: tuple[Array, Array],
     ) -> Corrected:  # fmt: skip
+        """The row of the given tangent stays in the determinant: with the new one it has the same sign, since both
+        have a positive product with the null vector x of [F_u, F_lambda]."""
         w = self.weights
         if tangent is None:
             new = Tangent(x[:, 1].copy(), 1.0, 1.0)
@@ -326,10 +320,10 @@ class HarmonicBalance(OrbitDiscretisation):
             t, k = x[: self.size, 1], float(x[-1, 1])
             length = float(np.sqrt(w @ t**2 + (tangent.weight * k) ** 2))
             new = Tangent(t / length, k / length, tangent.weight)
-            A[-1, :-1], A[-1, -1] = w * new.u, tangent.weight**2 * new.parameter
-            self._memo["tangent"] = (u, L.u, new, free)
-        sign = int(np.linalg.slogdet(A * self._row_scales(0 if tangent is None else 1))[0])
-        return Corrected(u, params, new, residual, iterations, sign, L, True)
+            self._memo["factors"] = (u, L.u, factors)
+        lu, pivots = factors
+        odd = (np.count_nonzero(np.diagonal(lu) < 0) + np.count_nonzero(pivots != np.arange(len(pivots)))) % 2
+        return Corrected(u, params, new, residual, iterations, -1 if odd else 1, L, True)
 
     # ------------------------------------------------------------------ spectrum, error, adaption
     def spectrum(self, linearisation: HarmonicLinearisation) -> Spectrum:
@@ -340,9 +334,7 @@ class HarmonicBalance(OrbitDiscretisation):
 
     def error(self, u: Array, params: Array) -> float:
         """Largest change of a state over its scale that the harmonics H + 1 .. 2H + 1 would make; inf: unknown."""
-        from .harmonic_truncation import correction
-
-        return correction(self.linearise(u, params)).error
+        return float(self.linearise(u, params).correction.error)
 
     def adapt(
         self, u: Array, params: Array, tangent: Tangent | None
@@ -379,10 +371,7 @@ class HarmonicBalance(OrbitDiscretisation):
         return np.concatenate([c[:1].astype(complex), 0.5 * (c[1::2] - 1j * c[2::2])])
 
 
-def _solved(A: Array, right: Array, scales: Array) -> Array | None:
-    """A x = right with scaled rows; None where A is singular or the result not finite."""
-    try:
-        x = np.linalg.solve(A * scales, right * scales)
-    except np.linalg.LinAlgError:
-        return None
-    return x if np.isfinite(x).all() else None
+def factored(A: Array, right: Array) -> tuple[Array, tuple[Array, Array]] | None:
+    """x of A x = right, and the factors (LU, pivots from 0); None where A is singular or the result not finite."""
+    lu, pivots, x, info = dgesv(A, right)
+    return (x, (lu, pivots)) if info == 0 and np.isfinite(x).all() else None

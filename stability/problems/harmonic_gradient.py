@@ -74,7 +74,7 @@ def _real_core_gradient(L: HarmonicLinearisation, w: Array, v: Array, free: int)
     by_omega = float((weight * (_linear_rate(L, c) + turn * _linear_curvature(L))).sum())
     by_omega -= float((second[:, velocities] * L.X[:, velocities]).sum()) / omega + float((through * slope).sum())
     by_p = -second[:, layout.n :].sum(axis=0) + by_omega * rates
-    along = float(weight.ravel() @ L._omega_column)
+    along = float(weight.ravel() @ L.by_omega)
     if own:
         by_period = -omega / L.period * by_omega + along * 2 * omega / L.period**2 * direction[-1]
         return np.append(by_c.ravel(), by_period), by_p
@@ -86,7 +86,7 @@ def _real_core_gradient(L: HarmonicLinearisation, w: Array, v: Array, free: int)
 def _omega_curvature(L: HarmonicLinearisation, free: int) -> Array:
     """d2 omega / dp_free dp, (m,), for omega = 2 pi / T(p)."""
     problem = L.problem
-    slope = problem.multiple * problem.evaluations.period_gradient(L.params)
+    slope = L.period_slopes
     bend = problem.multiple * problem.flow.period_second(L.params, free)
     return np.asarray(2 * L.omega * slope[free] * slope / L.period**2 - L.omega / L.period * bend)
 
@@ -178,8 +178,7 @@ def _real_spectral_gradient(L: HarmonicLinearisation, w: Array, v: Array) -> tup
     by_p = samples[:, n:].sum(axis=0)
     if problem.own:
         return np.append(by_c, by_period - omega / T * by_omega), by_p
-    slope = problem.multiple * problem.evaluations.period_gradient(L.params)
-    return by_c, by_p + by_omega * L.omega_slopes + by_period * slope
+    return by_c, by_p + by_omega * L.omega_slopes + by_period * L.period_slopes
 
 
 def _matrix_gradient(modes: Any, w: Array, v: Array, T: float) -> tuple[Array, float]:

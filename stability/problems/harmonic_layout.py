@@ -76,6 +76,16 @@ class HarmonicLayout:
         return places, self.rows[places]
 
     @cached_property
+    def velocities(self) -> Array:
+        """(q,) for each series the state that is its velocity, or -1."""
+        return np.where(self.second, self.rows, -1)
+
+    @cached_property
+    def turns(self) -> Array:
+        """(q,) winding of the unknowns."""
+        return np.asarray(self.winding[self.unknowns])
+
+    @cached_property
     def all_second(self) -> bool:
         """Whether there are no states of first order."""
         return bool(self.second.all())

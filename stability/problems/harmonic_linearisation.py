@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..kernels.fourier import derivative
+from ..kernels.harmonic_assembly import assemble
 
 if TYPE_CHECKING:
     from .harmonic_balance import HarmonicBalance
@@ -34,40 +35,36 @@ Array = np.ndarray
 class HarmonicLinearisation:
     """F, F_u and spectral data at (u, p); see `protocols.Linearisation`."""
 
-    def __init__(self, problem: HarmonicBalance, u: Array, params: Array, reference: Array | None = None) -> None:
-        layout = problem.layout
+    def __init__(
+        self, problem: HarmonicBalance, u: Array, params: Array, reference: Array | None = None, index: int = 0
+    ) -> None:
+        layout, basis = problem.layout, problem.layout.basis
         self.problem, self.u, self.params = problem, u, params
         self.reference = reference
         size = layout.count * layout.q
         self.c = u[:size].reshape(layout.count, layout.q)
-        self.period = float(u[-1]) if problem.own else problem.orbit_period(params)
+        N, n, m = layout.samples, layout.n, len(params)
+        self.X, self.F, self.J, self.Fp = np.empty((N, n)), np.empty((N, n)), np.empty((N, n, n)), np.empty((N, n, m))
+        self.period_slopes, self.balance = np.zeros(m), np.empty(size)
+        self.by_omega, self.by_index, self.by_coefficients = np.empty(size), np.empty(size), np.empty((size, size))
+        self.index = index
+        self.period = assemble(
+            problem.flow.address, problem.flow.period_address, float(problem.multiple), problem.phase, basis.points,
+            basis.synthesis, basis.slope, basis.analysis, basis.spectrum, basis.first, basis.second, basis.swap,
+            basis.turn, basis.k, layout.rows, layout.unknowns, layout.velocities, layout.turns, params, index, self.c,
+            float(u[-1]) if problem.own else 0.0, self.X, self.F, self.J, self.Fp, self.period_slopes, self.balance,
+            self.by_omega, self.by_index, self.by_coefficients,
+        )  # fmt: skip
         self.omega = 2 * np.pi / self.period
-        self.X = layout.states(self.c, self.omega)
-        self.F, self.J, self.Fp = problem.evaluations.FJP(problem.phase, self.X, params)
 
     # ------------------------------------------------------------------ residual
-    def _linear(self, c: Array, omega: float, power: int = 0) -> Array:
-        """omega^r D^r c (2H + 1, q), or its derivative by omega (`power` 1: r omega^(r-1)), winding included."""
-        layout = self.problem.layout
-        second = omega * omega if power == 0 else 2 * omega
-        first = omega if power == 0 else 1.0
-        k = layout.basis.k[:, None]
-        if layout.all_second:
-            return -second * k * k * c
-        slope = derivative(c)
-        if layout.turn is not None:
-            slope[0] += layout.turn / (2 * np.pi)
-        return np.where(layout.second, -second * k * k * c, first * slope)
-
     @cached_property
     def residual(self) -> Array:
         """F(u, p), (N,)."""
-        layout = self.problem.layout
-        values = self._linear(self.c, self.omega) - layout.basis.analysis @ self.F[:, layout.rows]
         if not self.problem.own:
-            return np.asarray(values.ravel())
+            return self.balance
         gap = 0.0 if self.reference is None else float(self.phase_row @ (self.u - self.reference))
-        return np.append(values.ravel(), gap)
+        return np.append(self.balance, gap)
 
     @property
     def size_of_residual(self) -> float:
@@ -106,41 +103,14 @@ class HarmonicLinearisation:
     @cached_property
     def matrix(self) -> Array:
         """F_u, dense (N, N)."""
-        layout, own = self.problem.layout, self.problem.own
-        count, q, omega = layout.count, layout.q, self.omega
-        places, velocities = layout.pairs
-        T = self.products
-        block = T[..., layout.unknowns]
-        through = layout.basis.times_derivative(T[..., velocities])
-        through *= omega
-        if layout.all_second:
-            block += through
-        else:
-            block[..., places] += through
-        size = count * q
-        A = np.empty((size + own, size + own))
-        A[:size, :size] = block.transpose(0, 2, 1, 3).reshape(size, size)
-        np.negative(A[:size, :size], out=A[:size, :size])
-        if own:
-            A[:size, size] = self._omega_column * (-omega / self.period)
-            A[size] = self.phase_row
-        diagonal = A.reshape(-1)[: size * (size + own) : size + own + 1]
-        diagonal -= self.problem.stiffness * (omega * omega)
-        if not layout.all_second:
-            rows, columns, values = self.problem.first_order_entries
-            A[rows, columns] += omega * values
+        if not self.problem.own:
+            return self.by_coefficients
+        size = len(self.balance)
+        A = np.empty((size + 1, size + 1))
+        A[:size, :size] = self.by_coefficients
+        A[:size, size] = self.by_omega * (-self.omega / self.period)
+        A[size] = self.phase_row
         return A
-
-    @cached_property
-    def _omega_column(self) -> Array:
-        """dR/domega at fixed coefficients, (size,)."""
-        layout = self.problem.layout
-        velocities = layout.pairs[1]
-        values = self._linear(self.c, self.omega, 1)
-        if len(velocities):
-            part = np.einsum("kij,kj->ki", self.J[:, layout.rows][:, :, velocities], self.X[:, velocities])
-            values = values - layout.basis.analysis @ (part / self.omega)
-        return np.asarray(values.ravel())
 
     @cached_property
     def omega_slopes(self) -> Array:
@@ -148,18 +118,18 @@ class HarmonicLinearisation:
         problem = self.problem
         if problem.own:
             return np.zeros(len(self.params))
-        gradient = problem.multiple * problem.evaluations.period_gradient(self.params)
-        return np.asarray(-self.omega / self.period * gradient)
+        return np.asarray(-self.omega / self.period * self.period_slopes)
 
     def column(self, name: str) -> Array:
         """dF/dp_name, (N,)."""
         problem, layout = self.problem, self.problem.layout
         index = problem.index(name)
-        values = -(layout.basis.analysis @ self.Fp[:, layout.rows, index]).ravel()
-        rate = self.omega_slopes[index]
-        if rate != 0.0:
-            values = values + rate * self._omega_column
-        return np.append(values, 0.0) if problem.own else np.asarray(values)
+        if index == self.index:
+            values = self.by_index
+        else:
+            moved = layout.basis.analysis @ self.Fp[:, layout.rows, index]
+            values = float(self.omega_slopes[index]) * self.by_omega - moved.ravel()
+        return np.append(values, 0.0) if problem.own else values
 
     # ------------------------------------------------------------------ solving
     def solve(self, rows: Array, columns: Array, corner: Array, right_sides: Array) -> Array:
@@ -204,6 +174,13 @@ class HarmonicLinearisation:
         return np.asarray(self.problem.column_sizes * v[: self.u.size])
 
     # ------------------------------------------------------------------ spectral matrix
+    @cached_property
+    def correction(self) -> Any:
+        """What the missing harmonics would change (see harmonic_truncation)."""
+        from .harmonic_truncation import correction
+
+        return correction(self)
+
     @cached_property
     def modes(self) -> Any:
         """Hill's eigenvalue problem of the truncated system, solved whole (see harmonic_spectrum)."""

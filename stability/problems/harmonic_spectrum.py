@@ -30,7 +30,7 @@ from ..kernels.gauss import gauss_rule
 from ..kernels.hill_matrix import hill_matrix, koopman_hill, mean_harmonics, selected
 from ..protocols import Spectrum
 from .harmonic_layout import slope_of
-from .harmonic_truncation import Correction, correction
+from .harmonic_truncation import Correction
 from .orbit_spectrum import deflated, eigenvalues, orbit_spectrum, spectrum_distance
 
 if TYPE_CHECKING:
@@ -250,7 +250,7 @@ def checked_spectrum(L: HarmonicLinearisation) -> Spectrum:
     unknown = np.full(n - own, np.nan, complex)
     if not np.isfinite(L.J).all():
         return orbit_spectrum(unknown, np.inf)
-    found = correction(L)
+    found = L.correction
     along = propagated(L, found) if np.isfinite(found.error) else None
     if along is not None:
         refined = _refined(L, along)
@@ -314,6 +314,6 @@ def independent_multipliers(problem: HarmonicBalance, u: Array, params: Array) -
     X = problem.layout.states(L.c, L.omega, s)
     A = problem.evaluations.FJ(np.mod(problem.multiple * s, 1.0), X, L.params)[1]
     out["koopman"] = eigenvalues(koopman_hill(A, L.omega, H))
-    along = propagated(L, correction(L))
+    along = propagated(L, L.correction)
     out["monodromy"] = np.full(n, np.nan, complex) if along is None else eigenvalues(along.monodromy)
     return out

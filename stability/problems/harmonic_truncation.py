@@ -19,6 +19,7 @@ import warnings
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dgetrs
 
 from ..errors import TruncationWarning
 from ..kernels.fourier import resized, series, tail_fit
@@ -88,7 +89,6 @@ def correction(L: HarmonicLinearisation) -> Correction:
     if not np.isfinite(L.J).all():
         return failed
     force = layout.basis.spectrum @ L.F[:, rows]
-    alias = np.zeros((layout.count, q))
     if not problem.exact_samples:
         s, G, slope, analysis, phase = _doubled_analysis(problem)
         X = layout.states_by(G, slope, s, L.c, L.omega)
@@ -101,23 +101,26 @@ def correction(L: HarmonicLinearisation) -> Correction:
     change = np.zeros_like(L.X)
     change[:, layout.unknowns] = G_upper @ upper
     change[:, velocities] = L.omega * (slope_upper @ upper[:, places])
-    pushed = np.einsum("kij,kj->ki", L.J[:, rows], change)
+    pushed = (L.J[:, rows] @ change[:, :, None])[:, :, 0]
     lower = layout.basis.analysis @ pushed - L.residual[: layout.count * q].reshape(layout.count, q)
-    step = _lower_step(L, np.stack([(lower + alias).ravel(), alias.ravel()], axis=1))
+    sides = [lower.ravel()] if problem.exact_samples else [(lower + alias).ravel(), alias.ravel()]
+    step = _lower_step(L, np.stack(sides, axis=1))
     if step is None:
         return failed
     size = layout.count * q
     delta = step[:size, 0].reshape(layout.count, q)
     d_omega = -L.omega / L.period * float(step[-1, 0]) if problem.own else 0.0
     change += _lower_states(L, delta, d_omega)
-    by_alias = _lower_states(L, step[:size, 1].reshape(layout.count, q), 0.0)
+    aliasing = 0.0
+    if not problem.exact_samples:
+        by_alias = _lower_states(L, step[:size, 1].reshape(layout.count, q), 0.0)
+        aliasing = float((np.abs(by_alias) / problem.scales).max())
     coefficients = np.concatenate([L.c + delta, upper])
     per_harmonic = np.hypot(coefficients[1::2], coefficients[2::2]) / problem.scales[layout.unknowns]
     period = L.period + (float(step[-1, 0]) if problem.own else 0.0)
     error = float((np.abs(change) / problem.scales).max())
     if problem.own:
         error = max(error, abs(period - L.period) / L.period)
-    aliasing = float((np.abs(by_alias) / problem.scales).max()) if alias.any() else 0.0
     return Correction(coefficients, period, error, aliasing, per_harmonic.max(axis=1))
 
 
@@ -154,12 +157,10 @@ def _lower_step(L: HarmonicLinearisation, force: Array) -> Array | None:
     sides = force.shape[1]
     if problem.own:
         force = np.vstack([force, np.zeros((1, sides))])
-    known = problem._memo.get("tangent")
-    if known is not None and (known[1] is L.u or np.array_equal(known[0], L.u) or np.array_equal(known[1], L.u)):
-        tangent, free = known[2], known[3]
-        row = (problem.weights * tangent.u)[None]
-        corner = np.array([[tangent.weight**2 * tangent.parameter]])
-        x = L.solve(row, L.column(free)[:, None], corner, np.vstack([force, np.zeros((1, sides))]))[:-1]
+    known = problem._memo.get("factors")
+    if known is not None and (known[1] is L.u or np.array_equal(known[0], L.u)):
+        lu, pivots = known[2]
+        x = dgetrs(lu, pivots, np.vstack([force / problem.row_sizes[:, None], np.zeros((1, sides))]))[0][:-1]
     else:
         x, *_ = np.linalg.lstsq(L.core, force / problem.row_sizes[:, None], rcond=1e-7)
         x = x * problem.column_sizes[:, None]
@@ -191,7 +192,7 @@ def adapted(
 ) -> tuple[HarmonicBalance, Array, Tangent | None] | None:
     """(problem, u, tangent) with better harmonics, samples or scales; None where the present ones are good."""
     L = problem.linearise(u, params)
-    found = correction(L)
+    found = L.correction
     fields: dict[str, Any] = {}
     scales = state_scales(L.X)
     period_scale = L.period if problem.own else 1.0
