@@ -52,6 +52,8 @@ _EXPORTS: dict[str, str] = {
     "System": "systems.system",
     "Table": "systems.tables",
     "Verdict": "words",
+    "compare": "comparing.overlay",
+    "Comparison": "results.comparison",
     "dimensionless": "systems.scaling",
     "linearised": "systems.linearising",
     "equations_of_motion": "systems.lagrangian",

@@ -204,18 +204,31 @@ class Branch:
         ConvergenceError
             A solution that must exist between two points did not converge.
         """
+        return tuple(problem.view(u, params) for problem, u, params in self._points_at(value))
+
+    def rows_at(self, **value: float) -> tuple[dict[str, Any], ...]:
+        """The named columns, and the verdict, of all solutions at a value of the continued parameter (see `at`)."""
+        rows = []
+        for problem, u, params in self._points_at(value):
+            spectrum = problem.spectrum(problem.linearise(u, params))
+            rows.append({**problem.measures(u, params), "verdict": spectrum.verdict})
+        return tuple(rows)
+
+    def _points_at(self, value: Mapping[str, float]) -> list[tuple[Any, Array, Array]]:
+        """(problem, u, params) of every solution at the value, in the order of the branch."""
         if len(value) != 1 or self.name not in value:
             wrong = next((k for k in value if k != self.name), "nothing")
             raise unknown_name("continued parameter", wrong, [self.name], "this branch")
-        target, found = float(value[self.name]), []
+        target = float(value[self.name])
+        found: list[tuple[float, tuple[Any, Array, Array]]] = []
         for i in np.nonzero(self.parameter == target)[0]:
-            found.append((float(i), self.solution(int(i))))
+            found.append((float(i), (self._problem(int(i)), self.unknowns[i], self._vector(int(i)))))
         gap = self.parameter - target
         for i in np.nonzero(gap[:-1] * gap[1:] < 0)[0]:
             found.append((i + 0.5, self._between(int(i), target)))
-        return tuple(s for _, s in sorted(found, key=lambda pair: pair[0]))
+        return [point for _, point in sorted(found, key=lambda pair: pair[0])]
 
-    def _between(self, i: int, target: float) -> Any:
+    def _between(self, i: int, target: float) -> tuple[Any, Array, Array]:
         problem, params = self._problem(i), self._vector(i)
         x = (target - self.parameter[i]) / (self.parameter[i + 1] - self.parameter[i])
         params[list(problem.parameters).index(self.name)] = target
@@ -226,7 +239,7 @@ class Branch:
         for guess in guesses:
             found = problem.correct(guess, params, self.name, None, 0.0, float(self.method["tolerance"]))
             if found.converged:
-                return problem.view(found.u, found.params)
+                return problem, found.u, found.params
         raise ConvergenceError(
             f"no solution converged at {self.name} = {target:.10g} between {self.parameter[i]:.10g} and "
             f"{self.parameter[i + 1]:.10g}; ask for it during the continuation with at=({target:.10g},)",
