@@ -93,7 +93,7 @@ def test_bad_input(results):
         st.compare(results["up"], full)
     with pytest.raises(InputError, match="cannot compare"):
         st.compare(full, 3.0)
-    with pytest.raises(UnknownNameError, match="w.max"):
+    with pytest.raises(UnknownNameError, match=r"w\.max"):
         st.compare(full, results["hb7"], quantity="w.max")
     other = st.continuation(st.Collocation(st.models.duffing(beta=0.0)), "xi", (0.02, 0.03))
     with pytest.raises(InputError, match="runs along xi"):
