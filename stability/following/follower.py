@@ -23,6 +23,7 @@ from ..words import Kind, Status
 from .events import changes
 from .locating import Found, Locator
 from .loops import Home, collapsed
+from .monitoring import Monitor
 from .points import Point, dot, make_point
 from .searching import between, hopped
 from .settings import Progress, Settings
@@ -70,6 +71,7 @@ class Follower(Iterator[Point]):
         self._norm = self._norm_of(first)
         self._extent: list[tuple[float, float]] = []
         self._event_values = [f(first.problem.view(first.u, first.params)) for _, f in settings.events]
+        self._monitor = Monitor(first)
         self._seen: dict[str, int] = {}
 
     # ------------------------------------------------------------------ iteration
@@ -290,6 +292,7 @@ class Follower(Iterator[Point]):
         """Also the parameter values and zeros of user functions asked for, between a, the found points and b."""
         own = [f for f in found if f.point.s >= a.s]
         knots = [a, *(f.point for f in sorted(own, key=lambda f: f.point.s)), b]
+        found = self._monitor.named(found) + self._monitor.zeros(self.locator, knots)
         if self.settings.at:
             found = found + self._values(knots)
         if self.settings.events:

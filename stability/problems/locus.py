@@ -28,6 +28,7 @@ from ..results.special import SpecialPoint
 from ..words import Kind, Verdict
 from .defining import first_extra
 from .locus_system import ExtendedLinearisation
+from .locus_tests import confirmed, monitors
 
 __all__ = ["Locus", "locus"]
 
@@ -223,7 +224,7 @@ class Locus:
 
     # ------------------------------------------------------------------ spectrum, adaption, what a user sees
     def spectrum(self, linearisation: ExtendedLinearisation) -> Spectrum:
-        """No values; the verdict of those that are not critical."""
+        """No values and no counts (their changes are no events of this curve); the verdict of those not critical."""
         L = linearisation
         if self.kind is Kind.FOLD:
             self._bordered(L)
@@ -237,7 +238,16 @@ class Locus:
             verdict = Verdict.UNSTABLE
         else:
             verdict = Verdict.STABLE if (growth < -inner.error).all() else Verdict.UNDETERMINED
-        return Spectrum(np.zeros(0, complex), inner.error, int((growth > 0).sum()), 0, 0, 0, verdict)
+        return Spectrum(np.zeros(0, complex), inner.error, 0, 0, 0, 0, verdict)
+
+    @property
+    def monitors(self) -> tuple[tuple[Kind, Any], ...]:
+        """Functions of a point of this curve whose zeros are points of codimension two (see `locus_tests`)."""
+        return monitors(self)
+
+    def confirmed(self, kind: Kind, point: Any, scale: float) -> Kind | None:
+        """The kind of a zero that was located; None where it is no special point."""
+        return confirmed(self, kind, point, scale)
 
     def others(self, values: NDArray[np.complex128], extra: Array) -> NDArray[np.complex128]:
         """The values without the critical ones."""

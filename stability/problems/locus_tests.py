@@ -1,0 +1,133 @@
+r"""Points of codimension two on a curve of special points: smooth functions whose zeros they are.
+
+With the values lambda_i of the spectrum (multipliers, eigenvalues; trivial ones left out), chi(z) = prod (z - lambda_i),
+the pair product pi = prod_(i<j) (lambda_i + lambda_j), or (lambda_i lambda_j - 1), over the values that are not critical:
+
+    curve             function -> point
+    fold              chi'(0) -> Bogdanov-Takens (orbits: chi'(1) -> resonance 1:1);  pi -> zero-Hopf;  chi(-1) -> fold-flip
+    Hopf              omega^2 -> Bogdanov-Takens;  product of the others -> zero-Hopf;  pi -> double Hopf;
+                      first Lyapunov coefficient -> generalized Hopf
+    period doubling   chi'(-1) -> resonance 1:2;  chi(1) -> fold-flip;  cubic coefficient -> generalized period doubling
+    Neimark-Sacker    c - 1, c + 1, c + 1/2, c -> resonances 1:1, 1:2, 1:3, 1:4 (c = cos theta);  d -> Chenciner
+
+chi' at the critical value is a symmetric function of all values, smooth where two of them meet (each of them alone is
+not). A cusp is where both parameters turn at once: the driver finds it as a fold of the curve, and it is named here.
+A zero that is a pole, or a neutral saddle (real values whose sum is 0, whose product is 1), is no such point.
+Reference: Kuznetsov (2004), chapters 8, 9 and section 10.4.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..words import Kind
+
+if TYPE_CHECKING:
+    from .locus import Locus
+
+__all__ = ["confirmed", "monitors"]
+
+Complex = NDArray[np.complex128]
+_STILL = 1e-4  # scaled rate of both parameters at a cusp
+
+
+def monitors(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
+    """(kind, function of a point of the curve) for every point of codimension two that its kind can have."""
+    circle = curve.inner.critical.circle
+    if curve.kind is Kind.FOLD and not circle:
+        return ((Kind.BOGDANOV_TAKENS, _slope(0.0)), (Kind.ZERO_HOPF, _pairs(circle)))
+    if curve.kind is Kind.FOLD:
+        return ((Kind.R1, _slope(1.0)), (Kind.FOLD_FLIP, _value(-1.0)))
+    if curve.kind is Kind.HOPF:
+        return (
+            (Kind.BOGDANOV_TAKENS, _extra(0.0)), (Kind.ZERO_HOPF, _rest), (Kind.DOUBLE_HOPF, _pairs(circle)),
+            (Kind.GENERALIZED_HOPF, _coefficient),
+        )  # fmt: skip
+    if curve.kind is Kind.PERIOD_DOUBLING:
+        return (
+            (Kind.R2, _slope(-1.0)), (Kind.FOLD_FLIP, _value(1.0)), (Kind.GENERALIZED_PERIOD_DOUBLING, _coefficient),
+        )  # fmt: skip
+    if curve.kind is Kind.NEIMARK_SACKER:
+        resonances = ((Kind.R1, 1.0), (Kind.R2, -1.0), (Kind.R3, -0.5), (Kind.R4, 0.0))
+        return (*((kind, _extra(c)) for kind, c in resonances), (Kind.CHENCINER, _coefficient))
+    return ()
+
+
+def confirmed(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
+    """The kind of a located zero, or None: nothing. `scale`: largest modulus of the function at the bracket's ends."""
+    if kind is Kind.FOLD:
+        second = curve.parts(point.tangent.u)[1] / curve.scale
+        still = abs(second) < _STILL and abs(point.tangent.parameter * point.tangent.weight) < _STILL
+        return Kind.CUSP if still and curve.kind is Kind.FOLD else kind
+    function = dict(monitors(curve)).get(kind)
+    if function is None:
+        return kind
+    value = function(point)
+    if not math.isfinite(value) or abs(value) > 1e-3 * scale:
+        return None
+    if kind in (Kind.ZERO_HOPF, Kind.DOUBLE_HOPF):
+        rest = _others(point) if not (curve.kind is Kind.HOPF and kind is Kind.ZERO_HOPF) else np.ones(1)
+        if curve.kind is Kind.FOLD or kind is Kind.DOUBLE_HOPF:
+            sums = np.abs(np.add.outer(rest, rest)) + 1e300 * np.eye(rest.size)
+            i, _ = np.unravel_index(int(np.argmin(sums)), sums.shape)
+            return kind if rest[i].imag != 0 else None
+    if curve.kind is Kind.HOPF and kind is not Kind.BOGDANOV_TAKENS and not curve.parts(point.u)[2][0] > 0:
+        return None  # beyond a Bogdanov-Takens point: neutral saddles
+    return kind
+
+
+def _values(point: Any) -> Complex:
+    curve, params = point.problem, point.problem.completed(point.u, point.params)
+    L = curve.inner.linearise(curve.parts(point.u)[0], params)
+    return np.asarray(curve.inner.spectrum(L).values)
+
+
+def _others(point: Any) -> Complex:
+    curve = point.problem
+    return np.asarray(curve.others(_values(point), curve.parts(point.u)[2]))
+
+
+def _slope(at: float) -> Callable[[Any], float]:
+    """chi'(at) as sum_i prod_(j != i) (at - lambda_j)."""
+
+    def function(point: Any) -> float:
+        factors = at - _values(point)
+        return float(np.real(sum(np.prod(np.delete(factors, i)) for i in range(factors.size))))
+
+    return function
+
+
+def _value(at: float) -> Callable[[Any], float]:
+    return lambda point: float(np.real(np.prod(at - _values(point))))
+
+
+def _extra(at: float) -> Callable[[Any], float]:
+    return lambda point: float(point.problem.parts(point.u)[2][0] - at)
+
+
+def _rest(point: Any) -> float:
+    return float(np.real(np.prod(_others(point))))
+
+
+def _pairs(circle: bool) -> Callable[[Any], float]:
+    def function(point: Any) -> float:
+        values = _others(point)
+        i, j = np.triu_indices(values.size, 1)
+        products = values[i] * values[j] - 1 if circle else values[i] + values[j]
+        return float(np.real(np.prod(products)))
+
+    return function
+
+
+def _coefficient(point: Any) -> float:
+    from .criticality import criticality_of
+
+    curve = point.problem
+    u, params = curve.parts(point.u)[0], curve.completed(point.u, point.params)
+    coefficient = criticality_of(curve.inner, curve.kind, u, params).coefficient
+    return math.nan if coefficient is None else coefficient
