@@ -12,8 +12,8 @@ with the left ones (rows of their inverse) the two-sided Rayleigh quotient
 
     lambda = w^T Hill v / w^T v
 
-differs from Hill's eigenvalue by the product of both residuals. Where that bound is not below 1e-10, a Hill matrix of
-order up to 140 is solved whole and its exponents are selected (kernels/hill_matrix); beyond, the bound joins the error.
+differs from Hill's eigenvalue by the product of both residuals. Where that bound is not below 1e-8, a Hill matrix of
+order up to 140 is solved whole and its exponents are selected (kernels/hill_matrix); the bound joins the error.
 Twice the difference between the two sets of multipliers is the error estimate: truncation of orbit and of modes both. A
 verdict that it does not support is UNDETERMINED.
 """
@@ -41,7 +41,7 @@ __all__ = ["HillModes", "Propagation", "checked_spectrum", "hill_modes", "indepe
 
 Array = np.ndarray
 _DEGREE = 5
-_BOUND = 1e-10
+_BOUND = 1e-8
 _WHOLE = 140  # order of the largest Hill matrix that is solved whole at an ordinary point
 _SMALL = 0.3
 _APART = 1e-2  # autonomous: nearer multipliers to 1 than this are left to the whole problem
@@ -185,7 +185,7 @@ def _refined(L: HarmonicLinearisation, along: Propagation) -> tuple[Array, Array
     None where the bound is too large and Hill's matrix small enough to be solved whole, or modes are not independent.
     """
     layout, T, omega = L.problem.layout, L.period, L.omega
-    mu, Y = np.linalg.eig(along.monodromy)
+    mu, Y = _eigen(along.monodromy)
     if not (np.abs(mu) > 1e-200).all():
         return None
     used = _not_trivial(mu) if L.problem.own else slice(None)
@@ -196,9 +196,8 @@ def _refined(L: HarmonicLinearisation, along: Propagation) -> tuple[Array, Array
     basis, samples = fourier_basis_of(layout.harmonics, S), layout.basis
     shrink = np.exp(-exponents * (np.arange(S) / S)[:, None])
     P = (along.fundamental @ Y) * shrink[:, None, :]
-    try:
-        left = np.linalg.inv(P)  # (S, mode, state)
-    except np.linalg.LinAlgError:
+    left = _inverses(P)  # (S, mode, state)
+    if left is None:
         return None
     n = layout.n
     v = (basis @ P.reshape(S, n * n)).reshape(-1, n, n)  # coefficient, state, mode
@@ -220,6 +219,37 @@ def _refined(L: HarmonicLinearisation, along: Propagation) -> tuple[Array, Array
     change = quotient * T - exponents
     change = np.where(np.imag(mu) == 0.0, change.real, change)
     return mu[used], (mu * np.exp(change))[used], worst
+
+
+def _eigen(M: Array) -> tuple[Array, Array]:
+    """Eigenvalues and vectors (columns); 2 x 2 without LAPACK's overhead."""
+    if len(M) != 2:
+        values, vectors = np.linalg.eig(M)
+        return values, vectors
+    (a, b), (c, d) = M.tolist()
+    if b == c == 0.0:
+        return np.array([a, d]), np.eye(2)
+    values = eigenvalues(M)
+    values = values.real if not values.imag.any() else values
+    first, second = values.tolist()
+    rows = [[b, b], [first - a, second - a]] if abs(b) >= abs(c) else [[first - d, second - d], [c, c]]
+    return values, np.array(rows)
+
+
+def _inverses(P: Array) -> Array | None:
+    """Inverses of (S, n, n), None where one is singular."""
+    if P.shape[1] != 2:
+        try:
+            return np.asarray(np.linalg.inv(P))
+        except np.linalg.LinAlgError:
+            return None
+    determinant = P[:, 0, 0] * P[:, 1, 1] - P[:, 0, 1] * P[:, 1, 0]
+    if not determinant.all():
+        return None
+    out = np.empty_like(P)
+    out[:, 0, 0], out[:, 1, 1] = P[:, 1, 1], P[:, 0, 0]
+    out[:, 0, 1], out[:, 1, 0] = -P[:, 0, 1], -P[:, 1, 0]
+    return np.asarray(out / determinant[:, None, None])
 
 
 def _not_trivial(mu: Array) -> Array | None:

@@ -135,7 +135,7 @@ def _upper_harmonics(L: HarmonicLinearisation, force: Array) -> Array:
     Z[:, :, places] -= ik * mean[:, velocities]
     right = force[::2] - 1j * force[1::2]
     # a harmonic that resonates in the mean system is not a matter of this estimate: keep the solve regular
-    x = np.linalg.solve(Z, right[:, :, None])[:, :, 0]
+    x = right / Z[:, 0] if layout.q == 1 else np.linalg.solve(Z, right[:, :, None])[:, :, 0]
     out = np.empty_like(force)
     out[::2], out[1::2] = x.real, -x.imag
     return out

@@ -263,7 +263,7 @@ TERMS = {
 
 @pytest.mark.parametrize("name", TERMS)
 def test_any_term_goes_through(name):
-    """Against collocation at one frequency beside resonance; kinked terms converge with the third power of H."""
+    """Against collocation at one frequency beside resonance; kinked ones only algebraically."""
     term, limit = TERMS[name]
     system = st.System.from_equations(
         {x.diff(t, 2): -2 * xi * x.diff(t) - term + F * sp.cos(Om * t)}, coordinates=[x], period=2 * sp.pi / Om,
