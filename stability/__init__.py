@@ -44,6 +44,8 @@ _EXPORTS: dict[str, str] = {
     "Monodromy": "floquet.period_maps",
     "monodromy": "floquet.period_maps",
     "simulate": "simulation.simulating",
+    "lyapunov": "simulation.chaos",
+    "LyapunovSpectrum": "simulation.chaos",
     "Ensemble": "simulation.simulating",
     "Trajectory": "results.trajectory",
     "sweep": "simulation.sweeping",

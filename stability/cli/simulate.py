@@ -114,7 +114,7 @@ def _document(
 
 def _report(console: Console, document: dict[str, Any], run: Trajectory) -> None:
     rows = [
-        ("time", f"{run.span[0]:g} to {run.span[1]:.8g}, {run.steps} steps in {document['seconds']:.3f} s; {run.status}"),
+        ("time", f"{run.span[0]:g} to {run.span[1]:.8g}, {run.steps} steps, {document['seconds']:.3f} s; {run.status}"),
         *((name, f"{v['min']:.8g} to {v['max']:.8g}") for name, v in document["values"].items()),
     ]
     if run.period is not None:

@@ -93,7 +93,7 @@ def _check_measure(system: Any, measure: str | None) -> None:
         return
     name, dot, what = measure.rpartition(".")
     check_names("state or output", [name if dot else measure], [*system.states, *system.outputs], f"'{system.name}'")
-    known = ("max", "min", "pp", "mean", "amplitude", "phase")
+    known = ("max", "min", "pp", "mean", "amplitude", "phase", "section")
     if dot and what not in known:
         raise InputError(f"--y {measure}: the measure is one of {', '.join(known)}")
 

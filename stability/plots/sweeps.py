@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, unknown_name
 from .style import SERIES, axis_label
 
 if TYPE_CHECKING:
@@ -19,16 +19,18 @@ if TYPE_CHECKING:
 
 __all__ = ["plot_sweep"]
 
-_MEASURES = ("max", "min", "pp", "mean", "amplitude", "phase")
+_MEASURES = ("max", "min", "pp", "mean", "amplitude", "phase", "section")
 
 
 def _measured(sweep: Sweep, name: str, measure: str) -> np.ndarray:
     columns = {
         "max": sweep.maximum, "min": sweep.minimum, "pp": sweep.peak_to_peak, "mean": sweep.mean,
-        "amplitude": sweep.amplitude(), "phase": sweep.phase(),
+        "amplitude": sweep.amplitude(), "phase": sweep.phase(), "section": sweep.section,
     }  # fmt: skip
     if measure not in columns:
         raise InputError(f"measure '{measure}'; a sweep has {', '.join(_MEASURES)} of every state and output")
+    if measure == "section" and name not in sweep.states:
+        raise unknown_name("state", name, sweep.states, "the section of this sweep")
     return np.asarray(columns[measure][name])
 
 
@@ -42,7 +44,8 @@ def plot_sweep(
     ----------
     sweep : Sweep
     ax : matplotlib Axes, optional
-    y : state or output with a measure, such as "y.max", "y.pp", "y_mm.amplitude"; default the first state's maximum
+    y : state or output with a measure, such as "y.max", "y.pp", "y_mm.amplitude"; default the first state's maximum;
+        "y.section" draws the stroboscopic points of all recorded periods, a bifurcation diagram
     factor : the values are multiplied by it (1000 for mm)
     color : of points and jumps; by the direction if missing
     jumps : whether jumps are drawn
@@ -79,6 +82,11 @@ def plot_sweep(
         "markersize": 2.6 if sweep.start == "rest" else 4.0, "color": color, "markeredgewidth": 0.7, **style,
     }  # fmt: skip
     settled = sweep.settled
+    if measure == "section":
+        dots = {**look, "marker": ".", "markersize": 1.5, "markeredgewidth": 0.0, **style}
+        ax.set_xlabel(axis_label(sweep.name, sweep.units.get(sweep.name, "")))
+        ax.set_ylabel(axis_label(name, sweep.units.get(name, "") if factor == 1.0 else ""))
+        return list(ax.plot(np.repeat(sweep.parameter, values.shape[1]), values.ravel(), **dots))
     artists = list(ax.plot(sweep.parameter[settled], values[settled], **look))
     if not settled.all():
         open_look = {**look, "markerfacecolor": "white", "label": None}

@@ -72,7 +72,7 @@ class Sweep:
     parameter : (N,) values in the order visited
     low, high, average : (N, q) smallest, largest, mean value of the q states and outputs
     coefficients : (N, q, H + 1) complex, c_k = mean of x exp(-2 pi i k t / T)
-    ends : (N, n) states at the ends of the dwells
+    strobes : (N, record, n) states at the ends of the recorded periods
     transient : (N,) estimated transient left over the half peak-to-peak value;  settled : (N,) bool
     multiple : (N,) int, the motion repeats after that many periods
     jumps : tuple of Jump;  params : mapping of the other parameters
@@ -90,7 +90,7 @@ class Sweep:
     high: Array
     average: Array
     coefficients: NDArray[np.complex128]
-    ends: Array
+    strobes: Array
     transient: Array
     settled: NDArray[np.bool_]
     multiple: NDArray[np.int64]
@@ -102,7 +102,7 @@ class Sweep:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for key in ("parameter", "low", "high", "average", "ends", "transient"):
+        for key in ("parameter", "low", "high", "average", "strobes", "transient"):
             object.__setattr__(self, key, frozen(getattr(self, key)))
         object.__setattr__(self, "coefficients", frozen(self.coefficients, complex))
         object.__setattr__(self, "settled", frozen(self.settled, bool))
@@ -141,6 +141,17 @@ class Sweep:
     def mean(self) -> Mapping[str, Array]:
         """State or output -> (N,) mean value."""
         return _Columns(self.names, self.average)
+
+    @property
+    def ends(self) -> Array:
+        """(N, n) states at the ends of the dwells."""
+        return self.strobes[:, -1]
+
+    @property
+    def section(self) -> Mapping[str, Array]:
+        """State -> (N, record) its values once a period: all of them over the parameter are a bifurcation diagram."""
+        n, record = len(self.states), self.strobes.shape[1]
+        return {s: self.strobes[:, :, i].reshape(-1, record) for i, s in enumerate(self.states[:n])}
 
     def _harmonic(self, k: int) -> NDArray[np.complex128]:
         if not 0 <= k < self.coefficients.shape[2]:
@@ -198,7 +209,7 @@ class Sweep:
         plain = ("system", "name", "window", "start", "states", "output_names", "params", "periods", "record", "units")
         header = {k: getattr(self, k) for k in plain} | {"status": str(self.status)}
         header["jumps"] = [[j.parameter, list(j.bracket), dict(j.before), dict(j.after)] for j in self.jumps]
-        arrays = ("parameter", "low", "high", "average", "coefficients", "ends", "transient", "settled", "multiple")
+        arrays = ("parameter", "low", "high", "average", "coefficients", "strobes", "transient", "settled", "multiple")
         return header, {k: getattr(self, k) for k in arrays}
 
     @classmethod

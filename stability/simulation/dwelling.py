@@ -33,10 +33,15 @@ class Dwell:
     high: Array
     average: Array
     coefficients: Array
-    end: Array
+    strobes: Array
     transient: float
     multiple: int
     ending: Ending
+
+    @property
+    def end(self) -> Array:
+        """(n,) state at the end."""
+        return self.strobes[-1]
 
     @property
     def settled(self) -> bool:
@@ -59,7 +64,8 @@ def dwell(
     if motion.ending is not Ending.COMPLETED:
         q = len(system.states) + len(system.outputs)
         empty = np.zeros(q)
-        return Dwell(empty, empty, empty, np.zeros((q, harmonics + 1), complex), motion.x, np.inf, 1, motion.ending)
+        none = np.zeros((q, harmonics + 1), complex)
+        return Dwell(empty, empty, empty, none, motion.x[None], np.inf, 1, motion.ending)
     last = as_trajectory(engine, motion, params, precision.rtol).window((periods - record) * period, periods * period)
     columns = np.concatenate([last.coefficients, last._expanded_outputs], axis=2)
     low, high = np.empty(columns.shape[2]), np.empty(columns.shape[2])
@@ -71,4 +77,5 @@ def dwell(
     largest = max(float(scale.max()), 1e-300)
     scale = np.where(scale > 1e-9 * largest, scale, largest)
     left, multiple = transient_left(strobes, scale, np.isin(system.states, system.angles))
-    return Dwell(low, high, coefficients[:, 0].real, coefficients, motion.x, left, multiple, motion.ending)
+    recorded = np.vstack([strobes[:, 1 + periods - record : -1].T, motion.x])
+    return Dwell(low, high, coefficients[:, 0].real, coefficients, recorded, left, multiple, motion.ending)

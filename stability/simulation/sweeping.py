@@ -285,7 +285,7 @@ def _collected(run: _Runner, values: Array, dwells: list[Dwell], last: Ending, j
         output_names=tuple(system.outputs), parameter=values,
         low=np.array([d.low for d in dwells]), high=np.array([d.high for d in dwells]),
         average=np.array([d.average for d in dwells]), coefficients=np.array([d.coefficients for d in dwells]),
-        ends=np.array([d.end for d in dwells]), transient=np.array([d.transient for d in dwells]),
+        strobes=np.array([d.strobes for d in dwells]), transient=np.array([d.transient for d in dwells]),
         settled=np.array([d.settled for d in dwells]), multiple=np.array([d.multiple for d in dwells]),
         params=fixed, periods=plan.periods, record=plan.record, status=last, jumps=jumps, units=dict(system.units),
     )  # fmt: skip
