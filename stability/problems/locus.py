@@ -390,7 +390,7 @@ def _born(problem: Problem, point: SpecialPoint, free: str, along: str) -> Locus
     params = point.params_vector
     second = point.params[free]
     extra = first_extra(point.kind, problem.critical, point.multipliers)
-    scale = abs(second) or 1.0
+    scale = max(abs(second), _SMALLEST_SCALE * (abs(problem.parameters[free]) or 1.0))
     curve = Locus(problem, point.kind, free, along, scale, _SMALLEST_SCALE * scale)
     U = np.concatenate([point.u, [second], extra])
     try:

@@ -3,6 +3,10 @@ r"""Normal forms with a known cubic coefficient, seen in nonlinear, mixed, possi
     pair     z1' = a z1 - w z2 + (c r + e z3) z1,   z2' = a z2 + w z1 + (c r + e z3) z2,   z3' = -k z3 + m r,  r = z1^2 + z2^2
     single   z1' = a z1 + (c z1^2 + e z3) z1,       z2' = -z2 + g z1 z3,                   z3' = -k z3 + m z1^2
 
+    takens   z1' = z2,                             z2' = a z1 + w z2 + c z1^3,         z3' = -k z3
+    nilfold  z1' = z2,                             z2' = a + w z2 + z1^2,              z3' = -k z3
+    folding  z1' = (a + z3) z1 + c z1^3,           z2' = -z2,                          z3' = m - z3^2
+
 On the centre manifold of a = 0, z3 = (m / k) r + ..., so that the effective cubic coefficient is c + e m / k.
 `planted`: x = A phi(y), phi = (y1, y2 + k1 y1^2, y3 + k2 y1 y2 + k3 y1^2), and
 
@@ -45,6 +49,12 @@ def planted(form: str, frame: str) -> st.System:
     if form == "pair":
         growth = p["a"] + p["c"] * r + p["e"] * z3
         rates = sp.Matrix([growth * z1 - p["w"] * z2, growth * z2 + p["w"] * z1, -p["k"] * z3 + p["m"] * r])
+    elif form == "takens":
+        rates = sp.Matrix([z2, p["a"] * z1 + p["w"] * z2 + p["c"] * z1**3, -p["k"] * z3])
+    elif form == "nilfold":
+        rates = sp.Matrix([z2, p["a"] + p["w"] * z2 + z1**2, -p["k"] * z3])
+    elif form == "folding":
+        rates = sp.Matrix([(p["a"] + z3 + p["c"] * z1**2) * z1, -z2, p["m"] - z3**2])
     else:
         growth = p["a"] + p["c"] * z1**2 + p["e"] * z3
         rates = sp.Matrix([growth * z1, -z2 + p["g"] * z1 * z3, -p["k"] * z3 + p["m"] * z1**2])
