@@ -1,10 +1,11 @@
 r"""Points of codimension two on a curve of special points: smooth functions whose zeros they are.
 
-With the values lambda_i of the spectrum (multipliers, eigenvalues; trivial ones left out), chi(z) = prod (z - lambda_i),
-the pair product pi = prod_(i<j) (lambda_i + lambda_j), or (lambda_i lambda_j - 1), over the values that are not critical:
+With the values lambda_i of the spectrum (multipliers, eigenvalues; no trivial ones), chi(z) = prod (z - lambda_i), and
+the product pi over pairs of the values that are not critical, lambda_i + lambda_j (eigenvalues; lambda_i lambda_j - 1):
 
     curve             function -> point
-    fold              chi'(0) -> Bogdanov-Takens (orbits: chi'(1) -> resonance 1:1);  pi -> zero-Hopf;  chi(-1) -> fold-flip
+    fold              chi'(0) -> Bogdanov-Takens;  pi -> zero-Hopf;  of orbits: chi'(1) -> resonance 1:1;
+                      chi(-1) -> fold-flip
     Hopf              omega^2 -> Bogdanov-Takens;  product of the others -> zero-Hopf;  pi -> double Hopf;
                       first Lyapunov coefficient -> generalized Hopf
     period doubling   chi'(-1) -> resonance 1:2;  chi(1) -> fold-flip;  cubic coefficient -> generalized period doubling
@@ -97,7 +98,8 @@ def _slope(at: float) -> Callable[[Any], float]:
 
     def function(point: Any) -> float:
         factors = at - _values(point)
-        return float(np.real(sum(np.prod(np.delete(factors, i)) for i in range(factors.size))))
+        products = [np.prod(np.delete(factors, i)) for i in range(factors.size)]
+        return float(np.sum(products).real)
 
     return function
 
