@@ -8,8 +8,8 @@ function. An `CompiledField` keeps the owners of both addresses alive.
 from __future__ import annotations
 
 import ctypes
-import weakref
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,6 @@ __all__ = ["CompiledField"]
 
 Array = np.ndarray
 _KINDS = [ctypes.c_int64] + [ctypes.c_void_p] * 3 + [ctypes.c_int64] + [ctypes.c_void_p] * 3
-_KNOWN: weakref.WeakValueDictionary[Any, CompiledField] = weakref.WeakValueDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +89,8 @@ class CompiledField:
 
     @classmethod
     def of(cls, system: Any) -> CompiledField:
-        """The field of a system, made once."""
-        known = _KNOWN.get(system)
-        if known is None:
-            known = _KNOWN[system] = cls._made(system)
-        return known
+        """The field of a system, made once; the last 64 are kept."""
+        return _kept(system)
 
     @classmethod
     def _made(cls, system: Any) -> CompiledField:
@@ -110,6 +106,11 @@ class CompiledField:
                 address, owner = _period_callback(evaluations)
         expressions = (system.rhs, tuple(system.states))
         return cls(evaluations, clock, evaluations.address("FJP"), address, kept, position, places, expressions, owner)
+
+
+@lru_cache(maxsize=64)
+def _kept(system: Any) -> CompiledField:
+    return CompiledField._made(system)
 
 
 def _clock(system: Any) -> Any:

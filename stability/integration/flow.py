@@ -125,13 +125,14 @@ def flow(
     if variations:
         z[:, 1 : n + 1] = np.eye(n)
     period, rates = _clock(compiled, params, which)
+    address = compiled.address if len(parameters) else compiled.evaluations.address("FJ" if variations else "F")
     steps, kept = 0, []
     breaks = compiled.breaks(params) if compiled.forced else np.zeros(0)
     h = 0.0
     for start, end in pieces(compiled, t0, t1, period, breaks):
         inside = 1e-13 * max(period, abs(end)) if len(breaks) else 0.0
         status, s, h, count, times, coefficients = runge_kutta.integrate(
-            compiled.address, params, 1.0, 0.0, 1.0 / period, start, end, z, np.array(which, np.int64), rates, rtol,
+            address, params, 1.0, 0.0, 1.0 / period, start, end, z, np.array(which, np.int64), rates, rtol,
             scales, h, inside, max_steps - steps, int(dense),
         )  # fmt: skip
         steps += count

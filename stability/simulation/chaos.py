@@ -138,8 +138,8 @@ def lyapunov(
     count = _BLOCKS * max(1, int(min(np.ceil(duration / step / _BLOCKS), _MOST)))
     if count >= _BLOCKS * _MOST:
         raise ConvergenceError(
-            f"deviations of '{system.name}' may grow {np.exp(_STRETCH):.1f} times within {step:.3g}: {duration / step:.2g} "
-            f"intervals are too many; is the motion escaping? State {dict(zip(system.states, x.tolist()))}",
+            f"deviations of '{system.name}' may grow {np.exp(_STRETCH):.1f}-fold within {step:.3g}, "
+            f"{duration / step:.2g} intervals are too many; is the motion escaping?",
             t=t, x=x,
         )  # fmt: skip
     step = duration / count
