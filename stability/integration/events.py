@@ -162,8 +162,9 @@ def guards_of(system: Any, events: Mapping[str, Any] | None = None, stopping: Se
             for row in (wall.coordinate, wall.velocity):
                 rows[row] = (1 - hold) * rows[row]
         smooth = system.replace(
-            rhs=tuple(rows), parameters=parameters, stops=(), outputs={}, units={}, name=f"{system.name}, switches frozen"
-        )
+            rhs=tuple(rows), parameters=parameters, stops=(), outputs={}, units={},
+            name=f"{system.name}, switches frozen",
+        )  # fmt: skip
     else:
         smooth = system
     kinds += ["event"] * len(user)
