@@ -1,9 +1,9 @@
 r"""Residual, Jacobian and parameter column of a harmonic-balance problem in one compiled call.
 
 The same quantities as problems/harmonic_linearisation.py, which states the equations; here by loops, because at 7
-harmonics numpy's calls cost ten times the arithmetic. Layout: coefficient l of series r at l q + r; q series, M = 2H + 1
-coefficients, N samples, n states. `velocities[r]` is the state that is omega x_r', or -1 for a series of first order.
-T(j) = Toeplitz + Hankel by the tables `first`, `second` of kernels/fourier.py.
+harmonics numpy's calls cost ten times the arithmetic. Layout: coefficient e of series r at e q + r; q series,
+M = 2H + 1 coefficients, N samples, n states. `velocities[r]` is the state that is omega x_r', or -1 for a series of
+first order. T(j) = Toeplitz + Hankel by the tables `first`, `second` of kernels/fourier.py.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ __all__ = ["assemble"]
 
 
 @kernel(inline=True)
-def _linear(k, order_two, c, l, r, omega, power):  # type: ignore[no-untyped-def]
-    """omega^r D^r c at coefficient l of series r (power 0), or its derivative by omega (power 1), without winding."""
+def _linear(k, order_two, c, e, r, omega, power):  # type: ignore[no-untyped-def]
+    """omega^r D^r c at coefficient e of series r (power 0), or its derivative by omega (power 1), without winding."""
     if order_two:
-        return -(omega * omega if power == 0 else 2.0 * omega) * k[l] * k[l] * c[l, r]
+        return -(omega * omega if power == 0 else 2.0 * omega) * k[e] * k[e] * c[e, r]
     scale = omega if power == 0 else 1.0
-    if l == 0:
+    if e == 0:
         return 0.0
-    return scale * k[l] * (c[l + 1, r] if l % 2 == 1 else -c[l - 1, r])
+    return scale * k[e] * (c[e + 1, r] if e % 2 == 1 else -c[e - 1, r])
 
 
 @kernel(inline=True)
@@ -34,17 +34,17 @@ def _states(G, slope, s, c, omega, unknowns, velocities, winding, X):  # type: i
     for i in range(N):
         for r in range(unknowns.shape[0]):
             x, v = 0.0, 0.0
-            for l in range(M):
-                x += G[i, l] * c[l, r]
-                v += slope[i, l] * c[l, r]
+            for e in range(M):
+                x += G[i, e] * c[e, r]
+                v += slope[i, e] * c[e, r]
             X[i, unknowns[r]] = x + s[i] * winding[r]
             if velocities[r] >= 0:
                 X[i, velocities[r]] = omega * (v + winding[r] / (2.0 * np.pi))
 
 
 @kernel(inline=True)
-def _add_product(spectrum, first, second, J, row, state, swap, turn, scale, r, j, table, A):  # type: ignore[no-untyped-def]
-    """A[block r, j] -= scale T(J_(row, state)) (D if `swap` is used: turn not all one)."""
+def _add_product(spectrum, first, second, J, row, state, places, turns, r, j, table, A):  # type: ignore[no-untyped-def]
+    """A[block r, j] -= T(J_(row, state)) with columns taken from `places` and multiplied by `turns` (D, or nothing)."""
     harmonics, N = spectrum.shape[0] - 2, J.shape[0]
     q_times = table.shape[0]
     for h in range(harmonics):
@@ -57,11 +57,11 @@ def _add_product(spectrum, first, second, J, row, state, swap, turn, scale, r, j
     table[q_times - 1] = 0.0
     M = first.shape[0]
     q = (A.shape[0] - A.shape[0] % M) // M
-    for l in range(M):
-        factor = scale * (0.5 if l == 0 else 1.0)
+    for e in range(M):
+        factor = 0.5 if e == 0 else 1.0
         for m in range(M):
-            place = swap[m]
-            A[l * q + r, m * q + j] -= factor * turn[m] * (table[first[l, place]] + table[second[l, place]])
+            place = places[m]
+            A[e * q + r, m * q + j] -= factor * turns[m] * (table[first[e, place]] + table[second[e, place]])
 
 
 @kernel
@@ -94,28 +94,33 @@ def assemble(  # type: ignore[no-untyped-def]
                     through[i, r] += J[i, rows[r], velocities[j]] * X[i, velocities[j]] / omega
     for r in range(q):
         second_order = velocities[r] >= 0
-        for l in range(M):
+        for e in range(M):
             force, moved, pushed = 0.0, 0.0, 0.0
             for i in range(N):
-                force += analysis[l, i] * F[i, rows[r]]
-                moved += analysis[l, i] * Fp[i, rows[r], index]
-                pushed += analysis[l, i] * through[i, r]
-            straight = winding[r] / (2.0 * np.pi) if l == 0 and not second_order else 0.0
-            R[l * q + r] = _linear(k, second_order, c, l, r, omega, 0) + omega * straight - force
-            by_omega[l * q + r] = _linear(k, second_order, c, l, r, omega, 1) + straight - pushed
-            column[l * q + r] = rate * by_omega[l * q + r] - moved
+                force += analysis[e, i] * F[i, rows[r]]
+                moved += analysis[e, i] * Fp[i, rows[r], index]
+                pushed += analysis[e, i] * through[i, r]
+            straight = winding[r] / (2.0 * np.pi) if e == 0 and not second_order else 0.0
+            R[e * q + r] = _linear(k, second_order, c, e, r, omega, 0) + omega * straight - force
+            by_omega[e * q + r] = _linear(k, second_order, c, e, r, omega, 1) + straight - pushed
+            column[e * q + r] = rate * by_omega[e * q + r] - moved
     A[:] = 0.0
-    same, ones = np.arange(M), np.ones(M)
+    places, turns = np.empty((2, M), np.int64), np.ones((2, M))
+    for e in range(M):
+        places[0, e], places[1, e], turns[1, e] = e, swap[e], turn[e] * omega
     table = np.empty(2 * (spectrum.shape[0] - 2) + 1)
     for r in range(q):
         for j in range(q):
-            _add_product(spectrum, first, second, J, rows[r], unknowns[j], same, ones, 1.0, r, j, table, A)
-            if velocities[j] >= 0:
-                _add_product(spectrum, first, second, J, rows[r], velocities[j], swap, turn, omega, r, j, table, A)
-        for l in range(M):
+            for which in range(2):
+                state = unknowns[j] if which == 0 else velocities[j]
+                if state >= 0:
+                    _add_product(
+                        spectrum, first, second, J, rows[r], state, places[which], turns[which], r, j, table, A
+                    )
+        for e in range(M):
             if velocities[r] >= 0:
-                A[l * q + r, l * q + r] -= omega * omega * k[l] * k[l]
-            elif l % 2 == 1:
-                A[l * q + r, (l + 1) * q + r] += omega * k[l]
-                A[(l + 1) * q + r, l * q + r] -= omega * k[l]
+                A[e * q + r, e * q + r] -= omega * omega * k[e] * k[e]
+            elif e % 2 == 1:
+                A[e * q + r, (e + 1) * q + r] += omega * k[e]
+                A[(e + 1) * q + r, e * q + r] -= omega * k[e]
     return T

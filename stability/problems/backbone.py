@@ -44,7 +44,7 @@ _MAX_ITERATIONS = {True: 30, False: 8}
 _MEASURES = ("fundamental", "max")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Backbone:
     """The family of free periodic motions of an oscillator, by amplitude, as a continuation problem.
 
@@ -117,6 +117,10 @@ class Backbone:
         object.__setattr__(self, "place", names.index(coordinate))
 
     place: int = field(init=False, repr=False)
+
+    def __repr__(self) -> str:
+        which = f"{self.of} amplitude of {self.coordinate}"
+        return f"Backbone of '{self.system.name}', mode {self.mode}, {which}, {self.inner.harmonics} harmonics"
 
     # ------------------------------------------------------------------ what the problem is
     @cached_property

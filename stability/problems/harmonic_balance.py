@@ -45,7 +45,7 @@ _SETTLED = 1e-12
 _MAX_HARMONICS, _MAX_SAMPLES = 1000, 65536
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class HarmonicBalance(OrbitDiscretisation):
     """Periodic orbits of a system, forced or autonomous, as a continuation problem with Fourier unknowns.
 
@@ -138,6 +138,11 @@ class HarmonicBalance(OrbitDiscretisation):
 
     layout: HarmonicLayout = field(init=False, repr=False)
     fixed_samples: bool = field(init=False, repr=False)
+
+    def __repr__(self) -> str:
+        periods = f", {self.subharmonic} forcing periods" if self.subharmonic > 1 else ""
+        plural = "s" if self.harmonics > 1 else ""
+        return f"HarmonicBalance of '{self.system.name}', {self.harmonics} harmonic{plural}{periods}"
 
     # ------------------------------------------------------------------ what the problem is
     @property
