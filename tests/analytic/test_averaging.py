@@ -164,22 +164,6 @@ def test_transient_of_the_slow_flow_follows_the_oscillator(order):
     assert observed_orders(errors, small)[-1] > (0.85 if order == 1 else 1.8)
 
 
-def test_hard_excitation_and_subharmonics():
-    """3:1 subharmonic of Duffing under forcing of order one: the forced part F/(1 - w^2) cos w t is kept, and the averaged
-    orbit is O(eps) from the exact one."""
-    from exact_orbits import periodic_orbit
-
-    errors, small = [], (0.04, 0.02, 0.01)
-    for value in small:
-        system = oscillator(e * x**3 + b * x.diff(t), e=value, b=0.002, F=4.0, w=3 * (1 + 1.25 * value))
-        slow = st.averaging(system, small=("e", "b"), resonance=(3, 1))
-        point = st.solve(st.Equilibrium(slow), start=dict(x_cos=1.2, x_sin=0.0))
-        assert math.hypot(*point.x) > 0.3  # a subharmonic, not the forced motion
-        start, _ = periodic_orbit(lambda s, q, f=system: f(s, q), 3 * system.period, st.reconstruct(slow, point, 0.0))
-        errors.append(np.abs(start - st.reconstruct(slow, point, 0.0)).max())
-    assert observed_orders(errors, small)[-1] > 0.8
-
-
 def test_superharmonic_of_soft_excitation_needs_hard_forcing_or_order_two():
     """x^2 has a 1:2 superharmonic at the second order: the forcing enters through F^2."""
     system = oscillator(e * x**2)
