@@ -58,7 +58,7 @@ def command(
     with console.working(f"following {model}") as tell:
         branches = _follow(model, chosen, method, parameter, window, first, labels, max_points, tell)
     seconds = time.perf_counter() - begun
-    for path in outputs:
+    for path in sorted(outputs, key=lambda path: path.suffix.lower() in PICTURES):  # data first: --y may be misspelt
         with console.working(f"writing {path}"), replacing(path) as temporary:
             _write(branches, temporary, y)
     document = {
@@ -127,9 +127,12 @@ def _report(console: Console, branches: list[Branch], seconds: float, outputs: t
     for branch in branches:
         console.say(repr(branch), bold=True)
         rows = []
+        rounding = 1e-13 * abs(branch.window[1] - branch.window[0])
         for point in branch.special:
             what = f"{point.kind}, {point.criticality}" if point.criticality else str(point.kind)
-            rows.append((point.label, f"{branch.name} = {point.params[branch.name]:.10g}", what))
+            value = point.params[branch.name]
+            value = 0.0 if abs(value) < rounding else value
+            rows.append((point.label, f"{branch.name} = {value:.10g}", what))
         console.table(rows)
     console.say(f"  {seconds:.2f} s")
     for path in outputs:

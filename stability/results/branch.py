@@ -303,7 +303,8 @@ class Branch:
 
     def __repr__(self) -> str:
         first, last = (f"{v:g}" for v in self.window)
-        marks = "  ".join(f"{p.label} {p.params[self.name]:.4g}" for p in self.special[:8])
+        values, zero = [p.params[self.name] for p in self.special[:8]], 1e-13 * abs(self.window[1] - self.window[0])
+        marks = "  ".join(f"{p.label} {0 if abs(v) < zero else v:.4g}" for p, v in zip(self.special, values))
         more = f"  ... {len(self.special) - 8} more" if len(self.special) > 8 else ""
         parts = [f"Branch {self.name} {first} -> {last}", f"{len(self)} points"]
         if marks:

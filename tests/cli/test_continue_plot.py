@@ -98,6 +98,20 @@ def test_a_branch_that_breaks_off_is_written_and_fails(folder: Path, capsys: pyt
     assert len(stored) > 5 and stored.parameter.min() >= 0
 
 
+def test_a_misspelt_column_costs_the_picture_only(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Data are written before pictures, whatever their order: the branch is not lost."""
+    assert main([*DUFFING, "--y", "u.mux", "-o", "b.png", "-o", "b.npz"]) == 2
+    assert "did you mean 'u.max'?" in capsys.readouterr().err
+    assert st.load("b.npz").labels == ("LP1", "LP2") and not (folder / "b.png").exists()
+
+
+def test_rounding_errors_are_not_shown(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Van der Pol's Hopf point is at mu = 0, not at 1e-32."""
+    assert main(["continue", "van_der_pol", "--parameter", "mu", "--range=-1:1"]) == 0
+    out = capsys.readouterr().out
+    assert "mu = 0  " in out and "e-" not in out
+
+
 def test_plot_draws_what_was_stored(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*DUFFING, "-o", "b.npz"]) == 0
     assert main(["plot", "b.npz", "--y", "u.max"]) == 0
