@@ -26,8 +26,8 @@ from ..protocols import Corrected, Critical, Problem, Seed, Spectrum, Tangent
 from ..results.revival import revive
 from ..results.special import SpecialPoint
 from ..words import Kind, Verdict
-from .defining import first_extra
-from .locus_system import ExtendedLinearisation
+from .defining import first_extra, singular_matrix
+from .locus_system import ExtendedLinearisation, Place
 from .locus_tests import confirmed, monitors
 
 __all__ = ["Locus", "locus"]
@@ -59,6 +59,7 @@ class Locus:
     scale: float
     least: float
     born: tuple[Array, Array, Array, float] | None = field(default=None, repr=False)  # U, params, direction, rate
+    _memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
     # ------------------------------------------------------------------ layout
     @property
@@ -146,9 +147,8 @@ class Locus:
 
     # ------------------------------------------------------------------ Newton
     def linearise(self, u: Array, params: Array) -> Any:
-        """The extended linearisation at any point."""
-        other = self.along if self.along != self.free else next(n for n in self.parameters if n != self.free)
-        return ExtendedLinearisation.at(self, u, params, other)
+        """Where a spectrum is wanted; the extended linearisation is made when something else is asked of it."""
+        return Place(self, u, params)
 
     def correct(
         self, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
@@ -199,13 +199,41 @@ class Locus:
             length = math.sqrt(float(self.weights @ t_u**2) + (tangent.weight * rate) ** 2)
             new = Tangent(t_u / length, rate / length, tangent.weight)
         try:
-            L: Any = ExtendedLinearisation.at(self, u, params, free)
+            residual = self._residual(u, params)
         except np.linalg.LinAlgError:
             return _failed(u, params, iterations, "singular")
-        residual = float(np.max(np.abs(L.residual)))
         if self.kind is Kind.BRANCH_POINT and abs(self.parts(u)[2][0]) > _UNFOLDED:
             return _failed(u, params, iterations, f"no branch point: '{self.free}' unfolds it")
-        return Corrected(u, self.completed(u, params), new, residual, iterations, 0, L, math.isfinite(residual))
+        return Corrected(u, self.completed(u, params), new, residual, iterations, 0, None, math.isfinite(residual))
+
+    def _residual(self, u: Array, params: Array) -> float:
+        """Largest residual of the inner equations, and the singular values that ought to be zero."""
+        x, _, extra = self.parts(u)
+        L = self.inner.linearise(x, self.completed(u, params))
+        A = singular_matrix(self.kind, L, self.inner.critical, self.along, extra)
+        values = np.linalg.svd(A, compute_uv=False)
+        self._memo["inner"] = (u, L)
+        return float(max(np.max(np.abs(L.residual)), values[-2 if self.kind in _PAIRS and values.size > 1 else -1]))
+
+    def inner_linearisation(self, u: Array, params: Array) -> Any:
+        """The inner problem's linearisation, remembered for the last point."""
+        known = self._memo.get("inner")
+        if known is None or known[0] is not u:
+            known = self._memo["inner"] = (u, self.inner.linearise(self.parts(u)[0], self.completed(u, params)))
+        return known[1]
+
+    def inner_values(self, u: Array, params: Array) -> NDArray[np.complex128]:
+        """The inner problem's multipliers or eigenvalues, remembered for the last point."""
+        return np.asarray(self._inner_spectrum(u, params).values)
+
+    def _inner_spectrum(self, u: Array, params: Array) -> Spectrum:
+        known = self._memo.get("spectrum")
+        if known is None or known[0] is not u:
+            L = self.inner_linearisation(u, params)
+            if self.kind is Kind.FOLD:
+                self._settled(u, params)
+            known = self._memo["spectrum"] = (u, self.inner.spectrum(L))
+        return known[1]  # type: ignore[no-any-return]
 
     def _row(self, tangent: Tangent | None, n: int) -> Array:
         """The last row in the order (u, lambda_1, lambda_2, e)."""
@@ -223,13 +251,11 @@ class Locus:
         return np.delete(x, place), float(x[place])
 
     # ------------------------------------------------------------------ spectrum, adaption, what a user sees
-    def spectrum(self, linearisation: ExtendedLinearisation) -> Spectrum:
+    def spectrum(self, linearisation: Place) -> Spectrum:
         """No values and no counts (their changes are no events of this curve); the verdict of those not critical."""
-        L = linearisation
-        if self.kind is Kind.FOLD:
-            self._bordered(L)
-        inner = self.inner.spectrum(L.inner)
-        others = self.others(inner.values, self.parts(L.u)[2])
+        u = linearisation.u
+        inner = self._inner_spectrum(u, linearisation.params)
+        others = self.others(inner.values, self.parts(u)[2])
         circle = self.inner.critical.circle
         growth = np.abs(others) - 1 if circle else others.real
         if not np.isfinite(inner.error) or not np.isfinite(growth).all():
@@ -265,17 +291,16 @@ class Locus:
             rest.pop(int(np.argmin([abs(v - target) for v in rest])))
         return np.array(rest, dtype=complex)
 
-    def _bordered(self, L: ExtendedLinearisation) -> None:
-        """At a fold F_u is singular: let the inner problem know the direction in which to estimate its error."""
-        self._settled(self.parts(L.u)[0], L.params, L)
-
-    def _settled(self, u: Array, params: Array, L: ExtendedLinearisation) -> Array:
-        null = np.real(L.inner.lift(np.real(L.found.right[:, 0])))
+    def _settled(self, u: Array, params: Array) -> Array:
+        """Inner u at a fold, corrected along its null vector: the inner problem then knows it, for its error there."""
+        L, x = self.inner_linearisation(u, params), self.parts(u)[0]
+        null = np.real(L.lift(np.linalg.svd(L.core)[2][-1]))
         size = math.sqrt(float(self.inner.weights @ null**2))
         if not (math.isfinite(size) and size > 0):
-            return u
-        found = self.inner.correct(u, params, self.along, Tangent(null / size, 0.0, 1.0), 0.0, 1e-6)
-        return found.u if found.converged else u
+            return x
+        border = Tangent(null / size, 0.0, 1.0)
+        found = self.inner.correct(x, self.completed(u, params), self.along, border, 0.0, 1e-6)
+        return found.u if found.converged else x
 
     def adapt(self, u: Array, params: Array, tangent: Tangent) -> tuple[Locus, Array, Tangent] | None:
         """The inner problem's better mesh or scales, and a scale that follows lambda_2."""
@@ -285,8 +310,7 @@ class Locus:
         better = None
         if self.kind is not Kind.BRANCH_POINT:
             if self.kind is Kind.FOLD:
-                L = self.linearise(u, params)
-                x = self._settled(x, params, L)
+                x = self._settled(u, params)
             better = self.inner.adapt(x, params, Tangent(t, tangent.parameter, tangent.weight))
         scale = self.scale
         if not 0.25 * scale < abs(second) < 2 * scale:
@@ -294,7 +318,7 @@ class Locus:
         if better is None and scale == self.scale:
             return None
         inner, x, t = (self.inner, x, t) if better is None else (better[0], better[1], better[2].u)
-        new = dataclasses.replace(self, inner=inner, scale=scale, born=None)
+        new = dataclasses.replace(self, inner=inner, scale=scale, born=None, _memo={})
         direction = np.concatenate([t, [t_second], t_extra])
         length = math.sqrt(float(new.weights @ direction**2) + (tangent.parameter * tangent.weight) ** 2)
         moved = Tangent(direction / length, tangent.parameter / length, tangent.weight)
@@ -319,10 +343,7 @@ class Locus:
         return self.inner.view(self._solution(u, params), self.completed(u, params))
 
     def _solution(self, u: Array, params: Array) -> Array:
-        x = self.parts(u)[0]
-        if self.kind is not Kind.FOLD:
-            return x
-        return self._settled(x, self.completed(u, params), self.linearise(u, params))
+        return self._settled(u, params) if self.kind is Kind.FOLD else self.parts(u)[0]
 
 
 def _failed(u: Array, params: Array, iterations: int, note: str) -> Corrected:

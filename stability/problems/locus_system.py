@@ -18,6 +18,7 @@ not, and no border can become orthogonal to what it has to complete. Reference: 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from .defining import Equations, equations, frame_of
 if TYPE_CHECKING:
     from .locus import Locus
 
-__all__ = ["ExtendedLinearisation"]
+__all__ = ["ExtendedLinearisation", "Place"]
 
 Array = NDArray[np.float64]
 
@@ -101,21 +102,48 @@ class ExtendedLinearisation:
         corner[q] = row[n:]
         return np.asarray(self.inner.solve(rows, self.columns, corner, right_sides))
 
-    @property
-    def core(self) -> Array:
-        """Not available: special points of the curve are found along it, not from a defining system.
 
-        Raises
-        ------
-        LinAlgError
-            Always (its gradient would need third derivatives of the inner problem).
-        """
-        raise np.linalg.LinAlgError("curves of special points have no defining system of their own")
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A point of the curve as a `protocols.Linearisation`: lazy, and without a core.
+
+    Special points of the curve are found along it (`locus_tests`), not from a defining system of their own, whose
+    gradients would need third derivatives of the inner problem.
+    """
+
+    problem: Locus
+    u: Array
+    params: Array
+
+    @cached_property
+    def extended(self) -> ExtendedLinearisation:
+        """The extended linearisation, by the parameter along which the point was found."""
+        return ExtendedLinearisation.at(self.problem, self.u, self.params, self.problem.along)
+
+    @property
+    def residual(self) -> Array:
+        """(N + q,): inner equations, then conditions."""
+        return self.extended.residual
 
     @property
     def spectral(self) -> Array:
         """That of the inner problem."""
-        return self.inner.spectral
+        return np.asarray(self.problem.inner_linearisation(self.u, self.params).spectral)
+
+    def column(self, name: str) -> Array:
+        """(N + q,): derivative by any parameter but lambda_2."""
+        return self.extended.column(name)
+
+    @property
+    def core(self) -> Array:
+        """Not available.
+
+        Raises
+        ------
+        LinAlgError
+            Always.
+        """
+        raise np.linalg.LinAlgError("curves of special points have no defining system of their own")
 
     def core_column(self, name: str) -> Any:
         """Not available, see `core`."""

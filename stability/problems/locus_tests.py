@@ -83,9 +83,7 @@ def confirmed(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None
 
 
 def _values(point: Any) -> Complex:
-    curve, params = point.problem, point.problem.completed(point.u, point.params)
-    L = curve.inner.linearise(curve.parts(point.u)[0], params)
-    return np.asarray(curve.inner.spectrum(L).values)
+    return np.asarray(point.problem.inner_values(point.u, point.params))
 
 
 def _others(point: Any) -> Complex:

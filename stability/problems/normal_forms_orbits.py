@@ -6,8 +6,8 @@ With variations V_i along the orbit (V' = sigma J V, V(0) = v_i) the map x(0) ->
     C(v_1, v_2, v_3) = U(1),    U' = sigma (J U + f_xxx[V_1, V_2, V_3] + sum f_xx[V_i, W_jk]),            U(0) = 0:
 
 forward sweeps through the condensed intervals, second and third directional derivatives of f at the stages. They are
-computed along real lines, D2[v, v] and D3[v, v, v], and polarised; S^-1 and the states' scales are applied as in the
-monodromy matrix.
+computed along real lines, D3[v, v, v] (on a section D2[v, v] too), and polarised; S^-1 and the states' scales are
+applied as in the monodromy matrix.
 
 Autonomous: the map to the section n.(x - x*) = 0, n = f(x*), is P = Phi(T + tau(x), x); with the jet x* + d(e) of
 Phi(T, x* + e v) and tau = t1 e + t2 e^2 + t3 e^3,
@@ -124,7 +124,7 @@ class MapForms:
 
     # ------------------------------------------------------------------ multilinear forms
     def second(self, x: Any, y: Any) -> Any:
-        """B(x, y) by polarisation of vectors brought to equal length."""
+        """B(x, y): directly, on a section by polarisation of vectors brought to equal length."""
         total: Any = np.zeros(len(self.matrix))
         for i, a in enumerate((np.real(x), np.imag(x))):
             for j, b in enumerate((np.real(y), np.imag(y))):
@@ -134,6 +134,9 @@ class MapForms:
         return total
 
     def _pair(self, a: Array, b: Array) -> Array:
+        if not self.own:
+            one, other = (self._sweep(self.scales * v, None)[1] for v in (a, b))
+            return self._returned(self._sweep(np.zeros(self.n), self._derivative(one, other))[0])
         if np.array_equal(a, b):
             return self._line(a, False)[0]
         return (self._line(a + b, False)[0] - self._line(a - b, False)[0]) / 4
