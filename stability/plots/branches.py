@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
 from ..words import Kind, Verdict
@@ -159,7 +160,7 @@ def plot_multipliers(branch: Branch, ax: Any = None, *, limit: float = 3.0, **st
     Returns
     -------
     list of artists
-        The stability limit, the values of all points, those of special points with their markers.
+        The stability limit, the values of all points, the critical ones of special points with their markers.
     """
     ax = _axes(ax)
     values = branch.values
@@ -177,12 +178,26 @@ def plot_multipliers(branch: Branch, ax: Any = None, *, limit: float = 3.0, **st
     for point in branch.special:
         if point.kind is Kind.USER:
             continue
-        inside = point.multipliers[np.abs(point.multipliers) <= limit] if circle else point.multipliers
-        artists += ax.plot(inside.real, inside.imag, zorder=3, **marker(point.kind, SERIES[2]))
+        critical = _critical(point, circle)
+        artists += ax.plot(critical.real, critical.imag, zorder=3, **marker(point.kind, SERIES[2]))
     what = "multipliers" if circle else "eigenvalues"
     ax.set_xlabel(f"real part of {what}")
     ax.set_ylabel("imaginary part")
     return artists
+
+
+def _critical(point: SpecialPoint, circle: bool) -> NDArray[np.complex128]:
+    """The value or the pair that is critical at a special point; all of them where its kind does not tell."""
+    values = point.multipliers
+    if point.kind in (Kind.NEIMARK_SACKER, Kind.HOPF):
+        upper = values[values.imag > 0]
+        distance = np.abs(np.abs(upper) - 1) if circle else np.abs(upper.real)
+        nearest = upper[np.argsort(distance)[:1]]
+        return np.concatenate([nearest, nearest.conj()])
+    places = {Kind.FOLD: float(circle), Kind.BRANCH_POINT: float(circle), Kind.PERIOD_DOUBLING: -1.0}
+    if point.kind not in places:
+        return values
+    return values[np.argsort(np.abs(values - places[point.kind]))[:1]]
 
 
 def _is_circle(branch: Branch) -> bool:
