@@ -13,6 +13,7 @@ from ._version import __version__ as __version__
 
 # public name -> module that defines it
 _EXPORTS: dict[str, str] = {
+    "families": "following.families",
     "locus": "problems.locus",
     "switch": "problems.switching",
     "solve": "following.driver",
@@ -45,6 +46,8 @@ _EXPORTS: dict[str, str] = {
     "monodromy": "floquet.period_maps",
     "simulate": "simulation.simulating",
     "lyapunov": "simulation.chaos",
+    "basins": "simulation.basin_maps",
+    "Basins": "results.basins",
     "LyapunovSpectrum": "simulation.chaos",
     "Ensemble": "simulation.simulating",
     "Trajectory": "results.trajectory",

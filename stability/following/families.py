@@ -1,0 +1,233 @@
+r"""`families`: several branches of one problem, detached ones too.
+
+Branches are started at both ends of the window. Then, at a few values of the parameter in between, solutions that no
+branch has yet are looked for by deflated Newton iteration: with the known solutions u_k,
+
+    M(u) F(u) = 0,   M(u) = prod_k (1 + 1 / |u - u_k|^2),      step = tau step_Newton,  tau = 1 / (1 - M'(step)/M),
+
+(norm of the problem), which cannot go to a known one. Every solution found is followed to both sides, and belongs from
+then on to the known ones. A search from finitely many guesses: what is found is there, what is not found may be.
+
+Reference: Farrell, Birkisson, Funke (2015), SIAM J. Sci. Comput. 37, A2026-A2045.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConvergenceError, InputError
+from ..protocols import Problem
+from ..results.branch import Branch
+from .driver import continuation
+
+__all__ = ["families"]
+
+Array = NDArray[np.float64]
+_SAME = 1e-5  # relative distance below which two solutions are one
+_MAX_NEWTON = 40
+_SAMPLES = 64
+
+
+def families(
+    problem: Problem,
+    name: str,
+    window: tuple[float, float],
+    *,
+    places: int = 5,
+    sizes: tuple[float, ...] = (0.5, 2.0, 8.0),
+    **options: Any,
+) -> tuple[Branch, ...]:
+    """All branches that starts at both ends of the window and a search between them find.
+
+    Parameters
+    ----------
+    problem : Problem
+        `Equilibrium`, or a forced orbit problem such as ``Collocation(system, multiple=3)``. For autonomous orbits give
+        one by ``start=``; nothing is searched for.
+    name : str
+        The continued parameter lambda.
+    window : (from, to)
+    places : int
+        Number of values of lambda, inside the window, at which more solutions are looked for.
+    sizes : tuple of float
+        Sizes of the guesses, relative to the largest known solution's states there.
+    **options
+        Passed on to `continuation`.
+
+    Returns
+    -------
+    tuple of Branch
+        In the order found; the first starts at `from`. Branches that were met from two sides are listed once.
+
+    Raises
+    ------
+    InputError
+        The problem is born at a special point, or `places` is no whole number >= 0.
+    ConvergenceError
+        Nothing at all was found.
+
+    Notes
+    -----
+    *Accuracy*: every branch is one of `continuation`. The set is a lower bound: deflation is no proof of completeness.
+
+    Examples
+    --------
+    >>> import sympy as sp, stability as st
+    >>> x, r = sp.symbols("x r", real=True)  # a trivial branch, and a circle around (r, x) = (0, 3)
+    >>> f = -x * ((x - 3) ** 2 + r**2 - 1)
+    >>> system = st.System(name="isola", coordinates=("x",), states=("x",), parameters={"r": 0.0}, rhs=(f,))
+    >>> len(st.families(st.Equilibrium(system), "r", (-2, 2)))
+    2
+    """
+    if problem.seed() is not None:
+        raise InputError("a problem born at a special point is one branch: give it to continuation")
+    if not isinstance(places, int) or places < 0:
+        raise InputError(f"places must be a whole number >= 0, got {places!r}")
+    first, last = (float(v) for v in window)
+    found: list[Branch] = []
+    trouble: ConvergenceError | None = None
+    for ends in ((first, last), (last, first)):
+        try:
+            if found and not _is_new(problem, name, ends[0], options.get("start"), found):
+                continue
+            found.append(continuation(problem, name, ends, **options))
+        except ConvergenceError as error:
+            trouble = error
+    searchable = not getattr(problem, "own", 0)
+    for k in range(places if searchable else 0):
+        value = first + (last - first) * (k + 0.5) / places
+        for solution in _new_solutions(problem, name, value, found, sizes):
+            try:
+                found.append(continuation(problem, name, (first, last), **{**options, "start": solution}))
+            except ConvergenceError as error:
+                trouble = error
+    if not found:
+        raise trouble or ConvergenceError("no solution was found anywhere in the window; give start=")
+    return tuple(found)
+
+
+# ---------------------------------------------------------------------- what is known
+def _params_at(problem: Problem, name: str, value: float) -> Array:
+    params = np.array(list(problem.parameters.values()), dtype=float)
+    params[list(problem.parameters).index(name)] = value
+    return params
+
+
+def _known(found: list[Branch], name: str, value: float) -> list[Any]:
+    """All solutions of the branches at a value of the parameter."""
+    solutions: list[Any] = []
+    for branch in found:
+        try:
+            solutions += branch.at(**{name: value})
+        except ConvergenceError:
+            continue
+    return solutions
+
+
+def _is_new(problem: Problem, name: str, value: float, start: Any, found: list[Branch]) -> bool:
+    params = _params_at(problem, name, value)
+    solution = problem.view(problem.start(params, start), params)
+    return all(_distance(problem, solution, other) > _SAME for other in _known(found, name, value))
+
+
+def _distance(problem: Problem, one: Any, other: Any) -> float:
+    """Largest difference of the states over their size; of orbits of k forcing periods the least over shifts by one."""
+    if not callable(one):
+        size = np.maximum(np.abs(one.x), np.abs(other.x)) + 1e-9
+        return float(np.max(np.abs(one.x - other.x) / size))
+    turns = _turns(problem)
+    times = np.linspace(0.0, one.period, 33)
+    values = one(times)
+    size = np.abs(values).max() + 1e-12
+    shifts = [other(times + j * one.period / turns) for j in range(turns)]
+    return float(min(np.abs(values - shifted).max() for shifted in shifts) / size)
+
+
+def _turns(problem: Problem) -> int:
+    return int(getattr(problem, "subharmonic", getattr(problem, "multiple", 1)))
+
+
+# ---------------------------------------------------------------------- what is new
+def _new_solutions(
+    problem: Problem, name: str, value: float, found: list[Branch], sizes: tuple[float, ...]
+) -> Iterator[Any]:
+    """Solutions at a value that are on none of the branches; `found` grows while this runs."""
+    params = _params_at(problem, name, value)
+    known = _known(found, name, value)
+    for guess in list(_guesses(problem, params, known, sizes)):
+        known = _known(found, name, value)
+        others = [u for u in (_unknowns(problem, params, s) for s in known) if u is not None]
+        u = _deflated(problem, params, guess, others)
+        if u is None:
+            continue
+        corrected = problem.correct(u, params, name, None, 0.0, 1e-9)
+        if not corrected.converged:
+            continue
+        solution = problem.view(corrected.u, params)
+        if all(_distance(problem, solution, other) > _SAME for other in known):
+            yield solution
+
+
+def _unknowns(problem: Problem, params: Array, solution: Any) -> Array | None:
+    try:
+        return problem.start(params, solution)
+    except ConvergenceError:
+        return None
+
+
+def _guesses(problem: Any, params: Array, known: list[Any], sizes: tuple[float, ...]) -> Iterator[Array]:
+    """Equilibria: random states; orbits: the largest known one plus a harmonic of the motion's own period."""
+    if not hasattr(problem, "discretise"):
+        n = len(problem.weights)
+        size = max((float(np.abs(s.x).max()) for s in known), default=0.0) or 1.0
+        random = np.random.default_rng(0)
+        for factor in sizes:
+            yield from factor * size * random.standard_normal((6, n))
+        return
+    system, turns = problem.system, _turns(problem)
+    period = float(problem.orbit_period(params))
+    times = np.arange(_SAMPLES * turns) * (period / (_SAMPLES * turns))
+    base = np.zeros((len(system.states), times.size)) if not known else known[0](times)
+    for factor in sizes:
+        for place, coordinate in enumerate(system.coordinates):
+            amplitude = factor * (float(np.abs(base[place]).max()) or 1.0)
+            for j in range(1, turns + 1):
+                omega = 2 * math.pi * j / period
+                for phase in (0.0, 0.5 * math.pi):
+                    states = base.copy()
+                    states[place] += amplitude * np.cos(omega * times + phase)
+                    if f"{coordinate}_dot" in system.states:
+                        rate = -amplitude * omega * np.sin(omega * times + phase)
+                        states[system.states.index(f"{coordinate}_dot")] += rate
+                    yield problem.discretise(times, states, period)
+
+
+def _deflated(problem: Problem, params: Array, u: Array, known: list[Array]) -> Array | None:
+    """Newton on M F from `u`; None where it does not settle."""
+    w, n = problem.weights, u.size
+    scale = max([float(w @ v**2) for v in known] + [float(w @ u**2)]) or 1.0
+    empty = np.zeros((0, n)), np.zeros((n, 0)), np.zeros((0, 0))
+    for _ in range(_MAX_NEWTON):
+        L = problem.linearise(u, params)
+        residual = np.asarray(L.residual)
+        if not np.isfinite(residual).all():
+            return None
+        step = L.solve(*empty, -residual[:, None])[:, 0]
+        if not np.isfinite(step).all():
+            return None
+        slope = 0.0
+        for other in known:
+            gap = u - other
+            square = float(w @ gap**2) / scale + 1e-300
+            slope -= 2 * float(w @ (gap * step)) / scale / (square * (square + 1))
+        step = step / (1 - slope) if slope != 1 else step
+        length = math.sqrt(float(w @ step**2) / scale)
+        u = u + step * min(1.0, 1.0 / length if length else 1.0)
+        if length < 1e-8:
+            return u
+    return None
