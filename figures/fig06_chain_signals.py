@@ -58,7 +58,7 @@ def draw(data: dict[str, Any], path: Path) -> None:
             plot_sweep(data[Omega0, 50], ax=axis, y=f"{name}.max", color=color, jumps=False, marker="o", markersize=2.4,
                        label="last 5 of 50 periods" if Omega0 == 1 else None)
         axis.set(xlabel=r"$\Omega$", xlim=(0.3, 2.0), yscale="log", ylim=(0.05, 70), ylabel="")
-    axes[0].set_ylabel("largest displacement over base amplitude")
+    axes[0].set_ylabel("displacement over base amplitude")
     axes[0].legend(frameon=False, fontsize="small")
     _figure.letter(axes[0], "(a) first mass")
     _figure.letter(axes[1], "(b) second mass")

@@ -39,6 +39,7 @@ _HOMES = {
     "stability-chart": "results.chart",
     "trajectory": "results.trajectory",
     "sweep": "results.sweep",
+    "basins": "results.basins",
 }
 T = TypeVar("T", bound=type)
 
