@@ -95,8 +95,10 @@ def test_documented_parameters_reads_numpydoc() -> None:
 
 # how to call the public functions that take ** keywords; a new one has to be added here
 OPEN: dict[str, Callable[[Any], Any]] = {
+    "basins": lambda f: f(models.duffing(), x=("u", -1, 1), y=("u_dot", -1, 1), no_such_keyword=1.0),
     "chart": lambda f: f(models.mathieu(), x=("a", 0, 1), y=("b", 0, 1), no_such_keyword=1.0),
     "linear_response": lambda f: f(models.linear_oscillator(), no_such_keyword=1.0),
+    "lyapunov": lambda f: f(models.duffing(), 10.0, no_such_keyword=1.0),
     "monodromy": lambda f: f(models.mathieu(), no_such_keyword=1.0),
     "reconstruct": lambda f: f(stability.averaging(models.duffing()), [1.0, 0.0], 0.0, no_such_keyword=1.0),
     "reconstruction_residual": lambda f: f(

@@ -33,7 +33,19 @@ Array = np.ndarray
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Ensemble(Sequence[Trajectory]):
-    """The motions of a batch: a sequence of `Trajectory`, callable: (n, B) at a number, (n, N, B) at an array."""
+    """The motions of a batch: a sequence of `Trajectory`, callable: (n, B) at a number, (n, N, B) at an array.
+
+    Attributes
+    ----------
+    members : tuple of Trajectory
+
+    Examples
+    --------
+    >>> import stability as st
+    >>> runs = st.simulate(st.models.duffing(), (0, 10), x0=dict(u=[0.0, 0.1, 0.2]))
+    >>> len(runs), runs(5.0).shape
+    (3, (2, 3))
+    """
 
     members: tuple[Trajectory, ...]
 
