@@ -97,6 +97,7 @@ def test_documented_parameters_reads_numpydoc() -> None:
 OPEN: dict[str, Callable[[Any], Any]] = {
     "basins": lambda f: f(models.duffing(), x=("u", -1, 1), y=("u_dot", -1, 1), no_such_keyword=1.0),
     "chart": lambda f: f(models.mathieu(), x=("a", 0, 1), y=("b", 0, 1), no_such_keyword=1.0),
+    "families": lambda f: f(stability.Collocation(models.duffing()), "Omega", (0.5, 0.6), no_such_keyword=1.0),
     "linear_response": lambda f: f(models.linear_oscillator(), no_such_keyword=1.0),
     "lyapunov": lambda f: f(models.duffing(), 10.0, no_such_keyword=1.0),
     "monodromy": lambda f: f(models.mathieu(), no_such_keyword=1.0),

@@ -34,6 +34,8 @@ METHODS = ("auto", "collocation", "shooting", "equilibrium")
 @click.option("--method", type=click.Choice(METHODS), default="auto", show_default=True, help="What is solved.")
 @click.option("--switch", "labels", multiple=True, metavar="LABEL",
               help="Go on from this point (PD1, BP1, HB1) to the branch that is born there; repeatable.")
+@click.option("--locus", "curve", metavar="LABEL", help="Then follow this point (PD1, LP1, NS1) in a second parameter.")
+@click.option("--free", metavar="NAME", help="The second parameter, for --locus.")
 @click.option("--max-points", type=click.IntRange(2), default=2000, show_default=True, help="At most so many points.")
 @click.option("--y", metavar="COLUMN", help="What a picture shows, such as u.max.")
 @click.option("-o", "--output", "outputs", type=click.Path(path_type=Path), multiple=True,
@@ -43,7 +45,8 @@ METHODS = ("auto", "collocation", "shooting", "equilibrium")
 @click.pass_obj
 def command(
     console: Console, model: str, parameter: str, window: tuple[float, float], pairs: tuple[tuple[str, Any], ...],
-    start: tuple[tuple[str, Any], ...], method: str, labels: tuple[str, ...], max_points: int, y: str | None,
+    start: tuple[tuple[str, Any], ...], method: str, labels: tuple[str, ...], curve: str | None, free: str | None,
+    max_points: int, y: str | None,
     outputs: tuple[Path, ...], force: bool,
 ) -> int:  # fmt: skip
     """Follow a branch of MODEL along a parameter, with its stability and special points.
@@ -51,16 +54,19 @@ def command(
     \b
     stability continue duffing --set beta=0.001 --parameter Omega --range 0.3:3 -o branch.png -o branch.npz
     stability continue autoparametric_pendulum --parameter Omega --range 0.5:1.5 --switch PD1 -o swing.npz
+    stability continue autoparametric_pendulum --parameter Omega --range 0.9:1.1 --locus PD1 --free length_ratio
     """
+    if (curve is None) != (free is None):
+        raise click.UsageError("--locus LABEL and --free NAME belong together: which point, and the second parameter")
     chosen, first = settings(pairs), settings(start)
     check_outputs(outputs, FORMATS, force)
     begun = time.perf_counter()
     with console.working(f"following {model}") as tell:
-        branches = _follow(model, chosen, method, parameter, window, first, labels, max_points, tell)
+        branches = _follow(model, chosen, method, parameter, window, first, labels, (curve, free), max_points, tell)
     seconds = time.perf_counter() - begun
     for path in sorted(outputs, key=lambda path: path.suffix.lower() in PICTURES):  # data first: --y may be misspelt
         with console.working(f"writing {path}"), replacing(path) as temporary:
-            _write(branches, temporary, y)
+            _write(branches if free is None else branches[-1:], temporary, y or free)
     document = {
         "model": model, "set": chosen, "parameter": parameter, "range": list(window), "seconds": seconds,
         "branches": [_facts(branch) for branch in branches], "written": [str(path) for path in outputs],
@@ -73,10 +79,10 @@ def command(
 
 def _follow(
     model: str, chosen: dict[str, Any], method: str, parameter: str, window: tuple[float, float],
-    first: dict[str, Any], labels: Sequence[str], max_points: int, tell: Any,
+    first: dict[str, Any], labels: Sequence[str], curve: tuple[str | None, str | None], max_points: int, tell: Any,
 ) -> list[Branch]:  # fmt: skip
-    """The branch, and those that are born at the labelled points, one from the other."""
-    from .. import Collocation, Equilibrium, Shooting, continuation, switch
+    """The branch, those that are born at the labelled points, one from the other, and a curve of special points."""
+    from .. import Collocation, Equilibrium, Shooting, continuation, locus, switch
     from ._models import system_from
 
     def progress(at: Any) -> None:
@@ -89,6 +95,9 @@ def _follow(
     branches = [continuation(kinds[method](system), parameter, window, start=first or None, **options)]
     for label in labels:
         branches.append(continuation(switch(branches[-1][label]), parameter, window, **options))
+    point, free = curve
+    if point is not None and free is not None:
+        branches.append(continuation(locus(branches[-1][point], free=free), parameter, window, **options))
     return branches
 
 
@@ -116,6 +125,7 @@ def _facts(branch: Branch) -> dict[str, Any]:
                 "label": point.label,
                 "kind": str(point.kind),
                 branch.name: point.params[branch.name],
+                "params": dict(point.params),
                 "criticality": None if point.criticality is None else str(point.criticality),
             }
             for point in branch.special

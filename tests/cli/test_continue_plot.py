@@ -51,6 +51,19 @@ def test_switching_to_the_branch_that_is_born(folder: Path, capsys: pytest.Captu
     assert not list(folder.iterdir())
 
 
+def test_a_curve_of_special_points(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Hopf points of the Lorenz system: rho = sigma (sigma + b + 3)/(sigma - b - 1)."""
+    arguments = ["continue", "lorenz", "--parameter", "rho", "--range", "15:30", "--json", "-o", "c.csv", "-o", "c.png"]
+    arguments += ["--start", "x=6", "--start", "y=6", "--start", "z=14", "--locus", "HB1", "--free", "sigma"]
+    assert main(arguments) == 0
+    assert len(json.loads(capsys.readouterr().out)["branches"]) == 2
+    with (folder / "c.csv").open(newline="") as stream:
+        rows = [(float(row["rho"]), float(row["sigma"])) for row in csv.DictReader(stream)]
+    rho, sigma = np.array(rows).T
+    assert np.allclose(rho, sigma * (sigma + 17 / 3) / (sigma - 11 / 3), rtol=1e-10, atol=0)
+    assert (folder / "c.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_report_names_the_points(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(LORENZ) == 0
     assert "BP1  rho = 1  branch point" in capsys.readouterr().out
@@ -71,6 +84,8 @@ MISTAKES = {
     "empty range": ([*LORENZ[:5], "3:3"], "differ"),
     "no such point": ([*LORENZ, "--switch", "PD1"], "PD1"),
     "nothing is born there": ([*DUFFING, "--switch", "LP1"], "LP1"),
+    "no second parameter": ([*LORENZ, "--locus", "BP1"], "--free"),
+    "no such second parameter": ([*LORENZ, "--locus", "BP1", "--free", "sigm"], "did you mean 'sigma'"),
     "equilibria of a forced system": ([*DUFFING, "--method", "equilibrium"], "Collocation"),
     "format": ([*LORENZ, "-o", "a.txt"], ".npz"),
     "no stored file": (["plot", "none.npz"], "none.npz"),
