@@ -25,7 +25,7 @@ from ..errors import TruncationWarning
 from ..kernels.fourier import resized, series, tail_fit
 from ..protocols import Tangent
 from .harmonic_layout import slope_of
-from .orbit_adaption import state_scales
+from .orbit_adaption import natural_sizes, state_scales
 
 if TYPE_CHECKING:
     from .harmonic_balance import HarmonicBalance
@@ -194,7 +194,7 @@ def adapted(
     L = problem.linearise(u, params)
     found = L.correction
     fields: dict[str, Any] = {}
-    scales = state_scales(L.X)
+    scales = state_scales(L.X, natural_sizes(problem.system, L.period))
     period_scale = L.period if problem.own else 1.0
     ratios = np.append(scales / problem.scales, period_scale / problem.period_scale)
     if ((ratios > 2) | (ratios < 0.5)).any():

@@ -28,7 +28,7 @@ from ..integration.flow import flow
 from ..kernels.gauss import gauss_rule
 from ..protocols import Corrected, Spectrum, Tangent
 from ..systems.stops import refuse_stops
-from .orbit_adaption import state_scales
+from .orbit_adaption import natural_sizes, state_scales
 from .orbit_spectrum import contracted, deflated, eigenvalues, orbit_spectrum, spectrum_distance
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
 from .shooting_linearisation import Segments, ShootingLinearisation
@@ -312,8 +312,9 @@ class Shooting(OrbitDiscretisation):
 
     def adapt(self, u: Array, params: Array, tangent: Tangent | None) -> tuple[Shooting, Array, Any] | None:
         """New scales where the solution has outgrown the present ones by a factor of 2; else None."""
-        scales = state_scales(self.pieces(u, params)[2].reshape(-1, self.n))
         period_scale = float(u[-1]) if self.own else 1.0
+        smallest = natural_sizes(self.system, period_scale if self.own else self.orbit_period(params))
+        scales = state_scales(self.pieces(u, params)[2].reshape(-1, self.n), smallest)
         ratios = np.append(scales / self.scales, period_scale / self.period_scale)
         if not ((ratios > 2) | (ratios < 0.5)).any():
             return None

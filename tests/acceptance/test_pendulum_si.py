@@ -94,6 +94,17 @@ def test_the_swinging_branch_is_that_of_the_dimensionless_system(rest, birth):
     np.testing.assert_allclose(angles, [p.solution.max["theta"] for p in there.special[:-1]], rtol=1e-5)
 
 
+def test_the_swinging_branch_by_harmonic_balance(physical, swing):
+    """Another discretisation, with the same scales of angles: the same points within its stated errors, the same end."""
+    rest = st.continuation(st.HarmonicBalance(physical, harmonics=9), "frequency", WINDOW)
+    with pytest.warns(st.errors.TruncationWarning):
+        other = st.continuation(st.switch(rest["PD2"]), "frequency", WINDOW)
+    assert other.status is st.Status.CLOSED_LOOP and other.labels == swing.labels
+    for one, exact in zip(other.special, swing.special, strict=True):
+        here, there = one.params["frequency"], exact.params["frequency"]
+        assert here == pytest.approx(there, rel=1e-9 + one.solution.error)
+
+
 def test_absorbed_motion_by_simulation(physical, swing, rest):
     """At 22.22 Hz the mass moves 30.52 dB less: what a pendulum that almost hung has settled on after 400 periods."""
     (orbit,) = (o for o in swing.at(frequency=HERTZ) if o.verdict is st.Verdict.STABLE)
