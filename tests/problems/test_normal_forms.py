@@ -156,3 +156,52 @@ def test_words_survive_a_file(tmp_path):
     branch.save(tmp_path / "lorenz.npz")
     again = st.load(tmp_path / "lorenz.npz")["HB1"]
     assert again.criticality is Criticality.SUBCRITICAL and again.coefficient == branch["HB1"].coefficient
+
+
+@pytest.mark.parametrize("e", [0.0, 0.6, -0.5])
+def test_torus_points_of_an_autonomous_orbit_by_its_reduction(e):
+    """Langford's system without its symmetry-breaking term: (|z|^2, w) is planar, the torus point its Hopf point.
+
+    At e = 0 it stands at m = 1.175 (0.49 + 0.48566667/4.7).
+    """
+    m, x, y, w, r = sp.symbols("m x y w r", real=True)
+
+    def axial(rho):
+        return sp.Rational(3, 5) + m * w - w**3 / 3 - rho * (1 + w / 4) + e * rho * w * (w - sp.Rational(7, 10))
+
+    spin, names = w - sp.Rational(7, 10), ("x", "y", "w")
+    full = st.System(
+        name="langford", coordinates=names, states=names, parameters={"m": 0.95},
+        rhs=(spin * x - 3.5 * y, 3.5 * x + spin * y, axial(x**2 + y**2)),
+    )  # fmt: skip
+    plane = st.System(
+        name="plane", coordinates=("r", "w"), states=("r", "w"), parameters={"m": 0.95}, rhs=(2 * spin * r, axial(r))
+    )
+    hopf = st.continuation(st.Equilibrium(full), "m", (-1.0, 1.0), start=dict(w=0.5))["HB1"]
+    torus = st.continuation(st.switch(hopf), "m", (-1.0, 2.5))["NS1"]
+    below = st.continuation(st.Equilibrium(plane), "m", (-0.5, 2.5), start=dict(r=0.1, w=0.7))["HB1"]
+    assert torus.params["m"] == pytest.approx(below.params["m"], abs=1e-8)
+    if e == 0:
+        assert torus.params["m"] == pytest.approx(1.175 * (0.49 + (0.6 - 0.343 / 3) / 4.7), abs=1e-9)
+    assert torus.criticality is below.criticality is not None
+
+
+def test_doubling_of_the_roessler_cycle():
+    """Supercritical: the doubled cycle is stable and lies beyond; its curve over (c, a) meets a separate branch."""
+    a, b, c, x, y, z = sp.symbols("a b c x y z", real=True)
+    system = st.System(
+        name="roessler", coordinates=("x", "y", "z"), states=("x", "y", "z"), parameters={"a": 0.2, "b": 0.2, "c": 2.0},
+        rhs=(-y - z, x + a * y, b + z * (x - c)),
+    )  # fmt: skip
+
+    def doubling(value):
+        problem = st.Collocation(system.with_params(a=value))
+        return st.continuation(problem, "c", (2.0, 3.2), start=dict(x=1, y=1, z=0))["PD1"]
+
+    point = doubling(0.2)
+    born = st.continuation(st.switch(point), "c", (2.0, 3.2), max_points=4)
+    assert point.criticality is Criticality.SUPERCRITICAL
+    assert born.verdicts[1] is Verdict.STABLE and born.parameter[-1] > point.params["c"]
+    curve = st.continuation(st.locus(point, free="a"), "c", (2.0, 3.2))
+    here = curve.at(c=doubling(0.22).params["c"])
+    assert here[0].params["a"] == pytest.approx(0.22, abs=2e-9)
