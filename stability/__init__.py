@@ -45,6 +45,8 @@ _EXPORTS: dict[str, str] = {
     "Monodromy": "floquet.period_maps",
     "monodromy": "floquet.period_maps",
     "simulate": "simulation.simulating",
+    "energy_balance": "simulation.energy",
+    "EnergyBalance": "simulation.energy",
     "lyapunov": "simulation.chaos",
     "basins": "simulation.basin_maps",
     "Basins": "results.basins",
