@@ -397,7 +397,7 @@ def locus(point: SpecialPoint, *, free: str, along: str | None = None) -> Locus:
         raise InputError(f"{point.label} is a {point.kind} point: curves exist for {known} points")
     problem, along = point.problem, point.free if along is None else along
     if isinstance(problem, Locus):
-        raise InputError(f"{point.label} lies on a curve of special points already: curves in three parameters do not exist")
+        raise InputError(f"{point.label} lies on a curve in two parameters already; a third one cannot be freed")
     names = list(problem.parameters)
     for name in (free, along):
         if name not in names:
