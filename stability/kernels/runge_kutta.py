@@ -48,8 +48,12 @@ def _slope(field, P, sigma, phase0, rate, low, high, s, z, n, which, sigma_p, F,
 
 
 @kernel(inline=True)
-def _error(K, h, z, new, rtol, atol, n):  # type: ignore[no-untyped-def]
-    """Scaled error of the step: the larger one of the state's and the variations'."""
+def _error(K, h, z, new, rtol, atol, n, P, which):  # type: ignore[no-untyped-def]
+    """Scaled error of the step: the larger one of the state's and the variations'.
+
+    A variation is held to rtol of its own largest entry; a derivative by a parameter p need not be better than what a
+    relative change of p by one makes of the state's tolerance (where it is zero, its rounding is all there is).
+    """
     worst = 0.0
     columns = z.shape[1]
     for first, last in ((0, 1), (1, columns)):
@@ -64,6 +68,8 @@ def _error(K, h, z, new, rtol, atol, n):  # type: ignore[no-untyped-def]
                     scale = atol[a] + rtol * max(abs(z[a, 0]), abs(new[a, 0]))
                 else:
                     scale = rtol * atol[a] * max(size, 1e-300) + 1e-300
+                    if which[k - 1] >= 0 and P[which[k - 1]] != 0.0:
+                        scale = max(scale, (atol[a] + rtol * abs(new[a, 0])) / abs(P[which[k - 1]]))
                 e5, e3 = 0.0, 0.0
                 for i in range(12):
                     e5 += _E5[i] * K[i, a, k]
@@ -146,7 +152,7 @@ def integrate(field, P, sigma, phase0, rate, s, end, z, which, sigma_p, rtol, at
             at = s + _C[i] * h
             _slope(field, P, sigma, phase0, rate, low, high, at, work, n, which, sigma_p, F, J, Fp, x, phase, K[i])
         _stage(_B, 12, h, z, K, new)
-        error = _error(K, h, z, new, rtol, atol, n)
+        error = _error(K, h, z, new, rtol, atol, n, P, which)
         if not error < 1.0:
             h *= min(1.0, max(0.1, 0.9 * error ** (-0.125) if error < np.inf else 0.1))
             rejected = True

@@ -199,3 +199,11 @@ def test_refusals_and_trouble():
     problem = Shooting(blow)
     found = problem.correct(np.zeros(1), np.array([1.0]), "Omega", None, 0.0, 1e-9)
     assert not found.converged and "not finite" in found.note
+
+
+def test_a_parameter_that_does_not_act_on_the_orbit_does_not_stop_the_integration():
+    """At phi = 0 nothing depends on the pendulum's length; its computed derivative is rounding (SI units, 0.2 g)."""
+    system = st.models.autoparametric_pendulum.from_physical()
+    one, two = st.solve(st.Shooting(system)), st.solve(st.Collocation(system))
+    assert one.max["y"] == pytest.approx(two.max["y"], rel=1e-8)
+    assert one.multipliers == pytest.approx(two.multipliers, rel=1e-6, abs=1e-9)
