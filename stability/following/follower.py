@@ -112,6 +112,8 @@ class Follower(Iterator[Point]):
             if isinstance(made, float):
                 h *= made
                 continue
+            if self._monitor.alone:
+                return *made, []
             found, doubtful = between(self.locator, self.before, self.last, made[0])
             found = [f for f in found if not self._known(f)]
             strange = any(f.kind is Kind.UNEXPLAINED for f in found)
@@ -292,7 +294,7 @@ class Follower(Iterator[Point]):
         """Also the parameter values and zeros of user functions asked for, between a, the found points and b."""
         own = [f for f in found if f.point.s >= a.s]
         knots = [a, *(f.point for f in sorted(own, key=lambda f: f.point.s)), b]
-        found = self._monitor.named(found) + self._monitor.zeros(self.locator, knots)
+        found = found + self._monitor.zeros(self.locator, knots)
         if self.settings.at:
             found = found + self._values(knots)
         if self.settings.events:

@@ -2,7 +2,8 @@ r"""Zeros of functions that a problem itself wants watched: points of codimensio
 
 A problem may have ``monitors``, a tuple of (kind, function of a point), and ``confirmed(kind, point, scale)``, which
 names a located zero or says that it is none (a pole, a neutral saddle). Zeros are found by Illinois iteration along the
-curve between neighbouring points, as for a user's events. Problems without monitors cost nothing here.
+curve between neighbouring points, as for a user's events, instead of the driver's own events: such a curve has neither
+counts nor defining systems of its own. Problems without monitors cost nothing here.
 """
 
 from __future__ import annotations
@@ -19,6 +20,11 @@ class Monitor:
     def __init__(self, first: Point) -> None:
         self.values = [function(first) for _, function in getattr(first.problem, "monitors", ())]
 
+    @property
+    def alone(self) -> bool:
+        """Whether the problem's own functions are all there is to watch."""
+        return bool(self.values)
+
     def zeros(self, locator: Locator, knots: list[Point]) -> list[Found]:
         """Zeros between neighbouring knots, all on one mesh; the first knot's values are those remembered."""
         found: list[Found] = []
@@ -34,13 +40,3 @@ class Monitor:
                 if point is not None and named is not None:
                     found.append(Found(point, named, (p.parameter, q.parameter), abs(q.s - p.s) * 1e-13))
         return found
-
-    def named(self, found: list[Found]) -> list[Found]:
-        """Events of the driver's own, by the names they have on this curve."""
-        out = []
-        for one in found:
-            confirm = getattr(one.point.problem, "confirmed", None)
-            kind = one.kind if confirm is None else confirm(one.kind, one.point, 1.0)
-            if kind is not None:
-                out.append(one._replace(kind=kind))
-        return out

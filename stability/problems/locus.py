@@ -1,4 +1,4 @@
-r"""`locus`: the curve of special points in two parameters, as a problem for the same `continuation`.
+r"""`Locus`: the curve of special points in two parameters, as a problem for the same `continuation`.
 
 A fold, Hopf, period-doubling, Neimark-Sacker or (where it persists) branch point is an isolated zero of its defining
 system (`defining`) at one parameter; with a second one free these zeros are curves. Unknowns (u, lambda_2, e) over the
@@ -21,23 +21,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, InputError, unknown_name
-from ..protocols import Corrected, Critical, Problem, Seed, Spectrum, Tangent
+from ..errors import InputError
+from ..protocols import Corrected, Critical, Seed, Spectrum, Tangent
 from ..results.revival import revive
-from ..results.special import SpecialPoint
 from ..words import Kind, Verdict
 from .defining import first_extra, singular_matrix
 from .locus_system import ExtendedLinearisation, Place
 from .locus_tests import confirmed, monitors
 
-__all__ = ["Locus", "locus"]
+__all__ = ["CURVES", "Locus"]
 
 Array = NDArray[np.float64]
-_KINDS = (Kind.FOLD, Kind.BRANCH_POINT, Kind.HOPF, Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER)
+CURVES = (Kind.FOLD, Kind.BRANCH_POINT, Kind.HOPF, Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER)
 _PAIRS = (Kind.HOPF, Kind.NEIMARK_SACKER)
 _MAX_NEWTON = 10
 _UNFOLDED = 1e-7
-_SMALLEST_SCALE = 0.05  # of the first scale of the second parameter
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +47,7 @@ class Locus:
     inner : Problem whose special points these are
     kind : Kind
     free : str, the second parameter lambda_2;  along : str, the one along which the point was found
-    scale : float, size of lambda_2 in the inner product;  least : float, its lower bound
+    scale : float, size of lambda_2 in the inner product
     """
 
     inner: Any
@@ -57,7 +55,6 @@ class Locus:
     free: str
     along: str
     scale: float
-    least: float
     born: tuple[Array, Array, Array, float] | None = field(default=None, repr=False)  # U, params, direction, rate
     _memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
@@ -109,7 +106,7 @@ class Locus:
         born = None if self.born is None else [np.asarray(part).tolist() for part in self.born]
         inner = dict(self.inner.spec)
         flag = {"view_only": True} if inner.get("view_only") else {}
-        return {**own, "scale": self.scale, "least": self.least, "born": born, "inner": inner, **flag}
+        return {**own, "scale": self.scale, "born": born, "inner": inner, **flag}
 
     @classmethod
     def from_spec(cls, spec: Mapping[str, Any]) -> Locus:
@@ -117,7 +114,7 @@ class Locus:
         born = spec["born"]
         if born is not None:
             born = (*(np.array(part, dtype=float) for part in born[:3]), float(born[3]))
-        fields = {key: spec[key] for key in ("free", "along", "scale", "least")}
+        fields = {key: spec[key] for key in ("free", "along", "scale")}
         return cls(revive(spec["inner"]), Kind(spec["kind"]), born=born, **fields)
 
     # ------------------------------------------------------------------ start
@@ -313,8 +310,8 @@ class Locus:
                 x = self._settled(u, params)
             better = self.inner.adapt(x, params, Tangent(t, tangent.parameter, tangent.weight))
         scale = self.scale
-        if not 0.25 * scale < abs(second) < 2 * scale:
-            scale = max(abs(second), self.least)
+        if abs(second) > 2 * scale:
+            scale = 2 * abs(second)
         if better is None and scale == self.scale:
             return None
         inner, x, t = (self.inner, x, t) if better is None else (better[0], better[1], better[2].u)
@@ -348,107 +345,3 @@ class Locus:
 
 def _failed(u: Array, params: Array, iterations: int, note: str) -> Corrected:
     return Corrected(u, params, None, math.inf, iterations, 0, None, False, note)
-
-
-def locus(point: SpecialPoint, *, free: str, along: str | None = None) -> Locus:
-    """The curve of special points like `point` in two parameters; give it to `continuation`.
-
-    F(u, lambda_1, lambda_2) = 0 together with the condition of the point's kind: multiplier +1 (fold, branch point),
-    -1 (period doubling), exp(+-i theta) (Neimark-Sacker), eigenvalue 0 (fold) or +-i omega (Hopf).
-
-    Parameters
-    ----------
-    point : SpecialPoint
-        A fold, Hopf, period-doubling, Neimark-Sacker or branch point of a branch, also of a loaded one.
-    free : str
-        The second parameter, which becomes an unknown; its values are the column of that name.
-    along : str or None
-        The parameter that `continuation` will follow; by default the one of the branch on which the point was found.
-
-    Returns
-    -------
-    Locus
-        For ``continuation(locus(point, free="xi"), "Omega", (lo, hi))``: both sides of the point, joined. Columns:
-        both parameters, ``torus_angle`` or ``hopf_frequency``, and the solution's. The verdict of a point tells whether
-        the values that are not critical are inside: STABLE where the curve is a border of stability.
-
-    Raises
-    ------
-    InputError
-        The kind has no curve, the two parameters are one, or a branch point that the second parameter breaks up.
-    UnknownNameError
-        No such parameter.
-    ConvergenceError
-        The defining system is singular at the point (itself a point of higher codimension).
-
-    Examples
-    --------
-    >>> import stability as st
-    >>> branch = st.continuation(st.Equilibrium(st.models.lorenz()), "rho", (15, 30), start=dict(x=6, y=6, z=14))
-    >>> curve = st.continuation(st.locus(branch["HB1"], free="sigma"), "rho", (20, 30))
-    >>> s, b, rho = curve.columns["sigma"], 8 / 3, curve.columns["rho"]
-    >>> float(abs(rho - s * (s + b + 3) / (s - b - 1)).max()) < 1e-9
-    True
-    """
-    if not isinstance(point, SpecialPoint):
-        raise InputError(f"locus needs a special point such as branch['PD1'], got {type(point).__name__}")
-    if point.kind not in _KINDS:
-        known = ", ".join(str(kind) for kind in _KINDS)
-        raise InputError(f"{point.label} is a {point.kind} point: curves exist for {known} points")
-    problem, along = point.problem, point.free if along is None else along
-    if isinstance(problem, Locus):
-        raise InputError(f"{point.label} lies on a curve in two parameters already; a third one cannot be freed")
-    names = list(problem.parameters)
-    for name in (free, along):
-        if name not in names:
-            raise unknown_name("parameter", name, names, "this problem")
-    if free == along:
-        raise InputError(
-            f"'{free}' is the parameter of the branch itself: name another one, or say along='...' which to follow"
-        )
-    return _born(problem, point, free, along)
-
-
-def _born(problem: Problem, point: SpecialPoint, free: str, along: str) -> Locus:
-    params = point.params_vector
-    second = point.params[free]
-    extra = first_extra(point.kind, problem.critical, point.multipliers)
-    scale = max(abs(second), _SMALLEST_SCALE * (abs(problem.parameters[free]) or 1.0))
-    curve = Locus(problem, point.kind, free, along, scale, _SMALLEST_SCALE * scale)
-    U = np.concatenate([point.u, [second], extra])
-    try:
-        L = ExtendedLinearisation.at(curve, U, params, along)
-        direction = _direction(curve, L)
-    except np.linalg.LinAlgError:
-        direction = None
-    if direction is None:
-        raise ConvergenceError(
-            f"the curve through {point.label} has no direction there: a point of higher codimension; begin beside it",
-            last=point.u,
-        )
-    if point.kind is Kind.BRANCH_POINT and abs(direction[0][-1]) > 1e-5 * _size(curve, direction[0]):
-        raise InputError(
-            f"{point.label} is a crossing that '{free}' breaks up: no branch points beside it. Follow the folds near "
-            f"it, or a parameter that keeps the symmetry or the trivial solution which makes it"
-        )
-    return dataclasses.replace(curve, born=(U, params, *direction))
-
-
-def _size(curve: Locus, direction: Array) -> float:
-    return math.sqrt(float(curve.weights @ direction**2)) or 1.0
-
-
-def _direction(curve: Locus, L: ExtendedLinearisation) -> tuple[Array, float] | None:
-    """The null vector of the extended linearisation: a border of random direction, then the result itself."""
-    n = L.u.size
-    w = np.insert(curve.weights, n - 1 - curve.extras, 1.0)
-    row = np.random.default_rng(0).standard_normal(n + 1) * np.sqrt(w)
-    right = np.zeros((n + 1, 1))
-    right[n] = 1.0
-    for _ in range(3):
-        t = L.solve_bordered(row, right)[:, 0]
-        length = math.sqrt(float(w @ t**2)) if np.isfinite(t).all() else math.nan
-        if not (math.isfinite(length) and length > 0):
-            return None
-        row = w * t / length
-    return curve._split(t / length)

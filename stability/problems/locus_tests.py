@@ -12,7 +12,8 @@ the product pi over pairs of the values that are not critical, lambda_i + lambda
     Neimark-Sacker    c - 1, c + 1, c + 1/2, c -> resonances 1:1, 1:2, 1:3, 1:4 (c = cos theta);  d -> Chenciner
 
 chi' at the critical value is a symmetric function of all values, smooth where two of them meet (each of them alone is
-not). A cusp is where both parameters turn at once: the driver finds it as a fold of the curve, and it is named here.
+not). Where the rate of the followed parameter vanishes the curve turns (fold); where both rates do, on a fold curve, it
+is a cusp.
 A zero that is a pole, or a neutral saddle (real values whose sum is 0, whose product is 1), is no such point.
 Reference: Kuznetsov (2004), chapters 8, 9 and section 10.4.
 """
@@ -38,7 +39,15 @@ _STILL = 1e-4  # scaled rate of both parameters at a cusp
 
 
 def monitors(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
-    """(kind, function of a point of the curve) for every point of codimension two that its kind can have."""
+    """(kind, function of a point of the curve): where it turns, and every point of codimension two it can have."""
+    return ((Kind.FOLD, _rate), *_by_kind(curve))
+
+
+def _rate(point: Any) -> float:
+    return float(point.tangent.parameter)
+
+
+def _by_kind(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
     circle = curve.inner.critical.circle
     if curve.kind is Kind.FOLD and not circle:
         return ((Kind.BOGDANOV_TAKENS, _slope(0.0)), (Kind.ZERO_HOPF, _pairs(circle)))

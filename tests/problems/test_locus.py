@@ -70,6 +70,18 @@ def test_branch_points_persist_where_a_symmetry_makes_them():
         st.locus(broken["BP1"], free="h")
 
 
+def test_a_closed_curve_is_followed_once():
+    """(x - 3 - r/3)^2 + r^2 + s^2 = 1: folds on the unit circle, which turns in r at +-1; no cusps there."""
+    system = scalar(-((x - 3 - r / 3) ** 2 + r**2 + s**2 - 1), r=0.0, s=0.2)
+    problem = st.Equilibrium(system)
+    branch = st.continuation(problem, "r", (-2, 2), start=st.solve(problem, start=dict(x=4.0)))
+    curve = st.continuation(st.locus(branch["LP1"], free="s"), "r", (-2, 2))
+    assert curve.statuses == (Status.CLOSED_LOOP,) * 2 and len(curve) < 100
+    assert np.abs(curve.columns["r"] ** 2 + curve.columns["s"] ** 2 - 1).max() < 1e-12
+    assert sorted(p.params["r"] for p in curve.of_kind(Kind.FOLD)) == pytest.approx([-1.0, 1.0], abs=1e-12)
+    assert not curve.of_kind(Kind.CUSP)
+
+
 # ---------------------------------------------------------------------- orbits
 def test_folds_of_cycles_of_the_bautin_normal_form():
     """mu = -ell^2/4, r^2 = ell/2."""
@@ -125,6 +137,9 @@ def test_folds_of_duffing_against_separate_branches(method):
         for point in st.continuation(problem(beta), "Omega", (0.3, 2.0)).of_kind(Kind.FOLD):
             values = [o.params["beta"] for o in curve.at(Omega=point.params["Omega"])]
             assert min(abs(v / beta - 1) for v in values) < 1e-8
+    (cusp,) = curve.of_kind(Kind.CUSP)
+    beside = [len(st.continuation(problem(cusp.params["beta"] * f), "Omega", (0.9, 1.2)).special) for f in (0.98, 1.02)]
+    assert beside == [0, 2]
 
 
 def test_torus_points_of_the_pendulum_against_separate_branches():
