@@ -34,10 +34,12 @@ def _axes(ax: Any) -> Any:
 
 
 def _default_column(branch: Branch) -> str:
-    """The first measure that is a maximum or a state, else the first there is."""
+    """Of a curve of special points the second parameter, else the first maximum, else the first measure there is."""
     names = [n for n in branch.columns if n not in (branch.name, "arclength", "residual")]
     if not names:
         raise InputError("this branch has no columns besides its parameter")
+    if branch.method.get("problem") == "Locus":
+        return names[0]
     return next((n for n in names if n.endswith(".max")), names[0])
 
 
