@@ -177,3 +177,17 @@ def test_requests_that_make_no_sense():
         st.locus(branch, free="s")
     with pytest.raises(InputError, match="along 'r'"):
         st.continuation(st.locus(branch["LP1"], free="s"), "s", (0, 1))
+
+
+def test_symmetry_breaking_of_duffing_against_a_separate_branch():
+    """Pitchforks of orbits persist: x(t + T/2) = -x(t) is a symmetry at every amplitude of the force."""
+
+    def last(force):
+        system = st.models.duffing_textbook(delta=0.2, alpha=1.0, beta=1.0, gamma=force, omega=2.0)
+        branch = st.continuation(st.Collocation(system), "omega", (1.8, 3.0))
+        return max(branch.of_kind(Kind.BRANCH_POINT), key=lambda p: p.params["omega"])
+
+    curve = st.continuation(st.locus(last(25.0), free="gamma"), "omega", (2.0, 2.5))
+    other = last(26.0).params["omega"]
+    values = [o.params["gamma"] for o in curve.at(omega=other)]
+    assert min(abs(v / 26.0 - 1) for v in values) < 1e-7
