@@ -165,7 +165,7 @@ def test_determinant_of_an_impact_orbit():
     orbit = flow(system, (0, system.period), run.final, variations=True, rtol=1e-12)
     det = e**4 * np.exp(-2 * xi * system.period)
     assert abs(np.linalg.det(orbit.matrix) - det) < 1e-10
-    x = run.final + [1e-3, -2e-3]  # Newton's method on the stroboscopic map, with the matrix over the impacts
+    x = run.final + np.array([1e-3, -2e-3])  # Newton's method on the stroboscopic map, with the matrix over the impacts
     for _ in range(5):
         end = flow(system, (0, system.period), x, variations=True, rtol=1e-12)
         x = x + np.linalg.solve(np.eye(2) - end.matrix, end.x - x)
