@@ -274,7 +274,8 @@ def _reciprocal_block(A: Array) -> bool:
     n = A.shape[-1]
     size = float(np.abs(A).max(initial=0.0))
     if n == 2:
-        return bool(np.all(np.abs(A[:, 0, 0] + A[:, 1, 1]) <= 1e-15 * size))
+        diagonal = np.abs(np.diagonal(A, axis1=1, axis2=2)).max(initial=0.0)  # not `size`: other units
+        return bool(np.all(np.abs(A[:, 0, 0] + A[:, 1, 1]) <= 1e-15 * diagonal))
     if n % 2:
         return False
     h = n // 2

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..kernels.block_triangular import mutual_blocks
 from .linearisation import PeriodicLinear
 
 __all__ = ["Structure", "blocks", "structure"]
@@ -68,7 +69,8 @@ def structure(linear: PeriodicLinear, nodes: Array) -> Structure:
     field = linear.bind(probes)
     A = field(phases)
     trace = np.asarray(np.trace(A, axis1=2, axis2=3), dtype=float)
-    size = np.abs(A).max()
+    # against the diagonal itself: off-diagonal entries have other units (k/m of a fast circuit is 1e21 beside R/L)
+    size = float(np.abs(np.diagonal(A, axis1=2, axis2=3)).max())
     constant_trace = bool(np.ptp(trace, axis=0).max() <= _ROUNDING * size)
     trace_free = bool(np.abs(trace).max() <= _ROUNDING * size * 1e-2)
     scalar = linear.n == 2 and bool(np.all(A[..., 0, 0] == 0) and np.all(A[..., 0, 1] == 1))
@@ -89,17 +91,8 @@ def blocks(linear: PeriodicLinear, nodes: Array) -> tuple[tuple[int, ...], ...]:
     lo, hi = nodes.min(axis=0), nodes.max(axis=0)
     probes = lo + (hi - lo) * np.random.default_rng(21).random((5, len(lo)))
     A = linear.bind(probes)(np.asarray((np.arange(32) + 0.37) / 32.0, dtype=np.float64))
-    size = np.abs(A).max(axis=(0, 1))
-    reach = (size > 1e-14 * size.max()) | np.eye(linear.n, dtype=bool)
-    for _ in range(linear.n):
-        reach = (reach.astype(int) @ reach.astype(int)) > 0
-    mutual = reach & reach.T
-    found: list[tuple[int, ...]] = []
-    for row in mutual:
-        group = tuple(int(i) for i in np.flatnonzero(row))
-        if group not in found:
-            found.append(group)
-    return tuple(found)
+    # exact zeros only: between units as far apart as q and q'' of a fast circuit no threshold tells noise from coupling
+    return tuple(tuple(group.tolist()) for group in mutual_blocks((A != 0.0).any(axis=(0, 1))))
 
 
 def _centre(linear: PeriodicLinear, field: Callable[[Array], Array], probes: Array, stiffness: Array) -> float | None:

@@ -128,3 +128,22 @@ def test_a_python_function_gives_the_chart_of_its_equation():
     left = st.chart(by_function, x=("a", -0.3, 2), y=("b", 0, 1.5), shape=14)
     right = st.chart(st.models.mathieu(delta=0.04), x=("a", -0.3, 2), y=("b", 0, 1.5), shape=14)
     np.testing.assert_allclose(left.growth_rate, right.growth_rate, rtol=0, atol=1e-11)
+
+
+def test_fast_circuits_are_slow_ones_in_other_units() -> None:
+    """L and C of a microwave circuit: 1/(L C) = 1e21 beside the 1 of q' = q_dot hides neither coupling nor damping."""
+    import numpy as np
+
+    import stability as st
+
+    slow, fast = dict(inductance=1.0, capacitance=1.0), dict(inductance=1e-9, capacitance=1e-12)
+    unit = np.sqrt(fast["inductance"] / fast["capacitance"])  # ohm: keeps the damping ratio
+    w0 = 1 / np.sqrt(fast["inductance"] * fast["capacitance"])
+    for resistance in (0.0, 1e-4, 0.05):
+        one = st.models.resistance_modulated_circuit(**slow, resistance=resistance, epsilon=3.0, omega=2.0)
+        two = st.models.resistance_modulated_circuit(**fast, resistance=resistance * unit, epsilon=3.0, omega=2.0 * w0)
+        a = st.chart(one, x=("omega", 1.2, 2.6), y=("epsilon", 0.1, 5.0), shape=(20, 20))
+        b = st.chart(two, x=("omega", 1.2 * w0, 2.6 * w0), y=("epsilon", 0.1, 5.0), shape=(20, 20))
+        assert np.abs(b.growth_rate / w0 - a.growth_rate).max() < 1e-8
+        assert (np.asarray(a.verdict.codes) == np.asarray(b.verdict.codes)).mean() > 0.99
+        assert bool((b.verdict == st.Verdict.NEUTRAL).any()) == (resistance == 0.0)

@@ -264,3 +264,15 @@ def test_result_is_frozen_and_shows_itself() -> None:
     assert "unstable" in repr(m) and "-1" in repr(m)
     assert m.params["a"] == 0.25 and m.about is None
     assert np.allclose(np.exp(m.exponents * m.period), m.multipliers, rtol=1e-13)
+
+
+def test_light_damping_of_a_fast_circuit_is_not_taken_for_none() -> None:
+    """R/L = 1e4 1/s beside 1/(L C) = 1e21 1/s^2: stable, not neutral; multipliers' product exp(-R T/L)."""
+    import stability as st
+
+    circuit = st.models.capacitance_modulated_circuit(
+        inductance=1e-9, capacitance=1e-12, resistance=1e-5, epsilon=0.0, omega=1e10
+    )
+    found = st.monodromy(circuit)
+    assert found.verdict is not st.Verdict.NEUTRAL
+    assert found.error > 0 and abs(np.prod(found.multipliers).real - np.exp(-1e4 * found.period)) < 1e-11
