@@ -33,9 +33,10 @@ class Monitor:
             values = [self.values[k], *(function(p) for p in knots[1:])]
             self.values[k] = values[-1]
             for (p, gp), (q, gq) in zip(zip(knots, values), zip(knots[1:], values[1:])):
-                if not gp * gq < 0:
+                if gq != 0 and not gp * gq < 0:
                     continue
-                point = locator.zero(p, q, function, gp, gq)
+                # a knot may lie on the zero itself: the middle of a segment that is symmetric about it
+                point = q if gq == 0 else locator.zero(p, q, function, gp, gq)
                 named = None if point is None else problem.confirmed(kind, point, max(abs(gp), abs(gq)))  # type: ignore[attr-defined]
                 if point is not None and named is not None:
                     found.append(Found(point, named, (p.parameter, q.parameter), abs(q.s - p.s) * 1e-13))
