@@ -1,11 +1,17 @@
 """From a slow flow back to the original oscillator in time, and what that leaves in the original equations.
 
 q(t) = Q(z, t, p),    residual r(t) = Q'' - f(t, Q, Q', p)  with  z constant (an equilibrium of the slow flow).
+
+Q is a sum of cosines and sines of multiples of one frequency, so that extrema of a steady motion are taken over one
+common period, from samples with a parabola through the three highest.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,9 +22,10 @@ from ..errors import InputError, check_names
 if TYPE_CHECKING:
     from ..systems.system import System
 
-__all__ = ["reconstruct", "reconstruction_residual"]
+__all__ = ["reconstruct", "reconstruction_residual", "steady_extrema"]
 
 Array = npt.NDArray[np.float64]
+_SAMPLES = 512
 
 
 def reconstruct(slow_system: System, slow_state: Any, t: npt.ArrayLike, **params: float) -> Array:
@@ -53,17 +60,63 @@ def reconstruct(slow_system: System, slow_state: Any, t: npt.ArrayLike, **params
     array([[0.5],
            [0. ]])
     """
-    import sympy as sp
-
     values, x = _values(slow_system, slow_state, params)
     time = np.asarray(t, dtype=float)
-    names = [*slow_system.states, *values, "t"]
-    function = sp.lambdify(
-        [sp.Symbol(n, real=True) for n in names], list(slow_system.reconstruction.values()), modules="numpy", cse=True
-    )
-    rows = function(*x, *values.values(), time)
+    rows = _motion(slow_system)(*x, *values.values(), time)
     shape = np.broadcast_shapes(time.shape, x.shape[1:])
     return np.array([np.broadcast_to(row, shape) for row in rows], dtype=float)
+
+
+@lru_cache(maxsize=64)
+def _motion(slow_system: System) -> Callable[..., Any]:
+    """(slow states, parameters, t) -> original states, compiled once for each slow flow."""
+    import sympy as sp
+
+    names = [*slow_system.states, *slow_system.parameters, "t"]
+    rows = list(slow_system.reconstruction.values())
+    return sp.lambdify([sp.Symbol(n, real=True) for n in names], rows, modules="numpy", cse=True)  # type: ignore[no-any-return]
+
+
+@lru_cache(maxsize=64)
+def _rates(slow_system: System) -> Callable[..., Any]:
+    """(slow states, parameters) -> the angular frequencies that occur in the reconstruction."""
+    import sympy as sp
+
+    t = sp.Symbol("t", real=True)
+    waves = {w for e in slow_system.reconstruction.values() for w in e.atoms(sp.sin, sp.cos) if w.has(t)}
+    rates = sorted({sp.diff(w.args[0], t) for w in waves}, key=str)
+    names = [*slow_system.states, *slow_system.parameters]
+    return sp.lambdify([sp.Symbol(n, real=True) for n in names], rates, modules="numpy")  # type: ignore[no-any-return]
+
+
+def steady_extrema(slow_system: System, states: Array, params: Mapping[str, Any]) -> tuple[Array, Array]:
+    """(low, high), (n_original, P) each, of the steady motions that slow states (n, P) stand for.
+
+    params gives each parameter as a number or as (P,) values. Error of the parabola: about (pi k/256)^4/10 relative
+    for a motion of k swings a period.
+    """
+    number = states.shape[1]
+    values = [np.broadcast_to(np.asarray(params[k], float), (number,)) for k in slow_system.parameters]
+    rates = np.array([np.broadcast_to(r, (number,)) for r in _rates(slow_system)(*states, *values)])
+    slowest = np.abs(rates).min(axis=0)
+    parts = [Fraction(float(r)).limit_denominator(24) for r in np.abs(rates[:, 0]) / slowest[0]]
+    period = 2 * np.pi / slowest * math.lcm(*(part.denominator for part in parts))
+    time = period[:, None] * np.arange(_SAMPLES) / _SAMPLES
+    rows = _motion(slow_system)(*states[:, :, None], *(v[:, None] for v in values), time)
+    waves = np.array([np.broadcast_to(row, time.shape) for row in rows])
+    return -_tops(-waves), _tops(waves)
+
+
+def _tops(waves: Array) -> Array:
+    """Largest values along the last axis (one period), by a parabola through the highest sample and its neighbours."""
+    place = waves.argmax(axis=-1)[..., None]
+    before, here, after = (
+        np.take_along_axis(waves, (place + k) % waves.shape[-1], axis=-1)[..., 0] for k in (-1, 0, 1)
+    )
+    bend = before - 2 * here + after
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rise = np.where(bend < 0, (after - before) ** 2 / (-8 * bend), 0.0)
+    return np.asarray(here + rise)
 
 
 def reconstruction_residual(

@@ -1,43 +1,46 @@
 """`compare`: errors of several methods against a reference along the parameter.
 
 At each value of the parameter all solutions of both methods are found by solving (not by interpolation), matched by
-verdict (`matching`), and compared in one quantity; folds are matched in order. A sweep is compared with the stable
-solution of the reference that is nearest to it, at its own settled points. The slow flow of `averaging` carries its
-amplitude as the output ``<coordinate>_amplitude``, which stands for ``<coordinate>.amplitude(1)``.
+verdict (`matching`), and compared in one quantity (`curves`); folds are matched in order. A sweep is compared with the
+stable solution of the reference that is nearest to it, at its own settled points.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, unknown_name
+from ..errors import InputError
 from ..results.branch import Branch
 from ..results.comparison import Comparison, Difference
 from ..results.sweep import Sweep
-from ..words import Kind, Verdict
+from ..words import Verdict
+from .curves import Curves, default_quantity, described, unique
 from .matching import matched
 
-__all__ = ["compare"]
+__all__ = ["compare", "difference"]
 
 Array = NDArray[np.float64]
 
 
-def compare(reference: Branch, *others: Any, quantity: str | None = None, points: int = 81) -> Comparison:
+def compare(
+    reference: Branch | Sequence[Branch], *others: Any, quantity: str | None = None, points: int = 81
+) -> Comparison:
     """Lay other results over a reference and say, in numbers, where they differ and what they miss.
 
     Parameters
     ----------
-    reference : Branch
+    reference : Branch or sequence of Branch
         The answer that the others are measured against.
-    *others : Branch or Sweep
+    *others : Branch, sequence of Branch, or Sweep
         Branches of any method (collocation, harmonic balance, the slow flow of averaging, ...) or sweeps, along the
-        same parameter.
+        same parameter. Several branches of one method (what `families` returns) count together.
     quantity : str, optional
         Compared column, ``"<coordinate>.amplitude(1)"`` or ``"<state>.max"``; by default the fundamental amplitude of
-        the reference's first coordinate.
+        the reference's first coordinate. Extrema of a slow flow are those of the reconstructed motion.
     points : int
         How many values of the parameter branches are compared at.
 
@@ -64,118 +67,86 @@ def compare(reference: Branch, *others: Any, quantity: str | None = None, points
     >>> st.compare(full, slow, points=5)["averaging"].worst < 0.01
     True
     """
-    if not isinstance(reference, Branch):
-        raise InputError(f"the reference must be a Branch; got {type(reference).__name__}")
+    first = _several(reference)
+    if first is None:
+        raise InputError(f"the reference must be a Branch or several; got {type(reference).__name__}")
     if not others:
         raise InputError("give at least one result to compare with the reference")
     if not isinstance(points, int) or points < 2:
         raise InputError(f"points must be a whole number >= 2; got {points!r}")
     for other in others:
-        if not isinstance(other, (Branch, Sweep)):
+        if _several(other) is None and not isinstance(other, Sweep):
             raise InputError(f"cannot compare a {type(other).__name__}; give branches and sweeps")
-    column = quantity or _default_quantity(reference)
-    base = _column(reference, column)
-    names = _names([reference, *others])
-    differences = {}
-    for name, other in zip(names[1:], others):
-        if other.name != reference.name:
-            raise InputError(f"'{name}' runs along {other.name}, the reference along {reference.name}")
-        if isinstance(other, Sweep):
-            differences[name] = _sweep_difference(name, reference, base, other, column)
-        else:
-            differences[name] = _branch_difference(name, reference, base, other, _column(other, column), points)
-    return Comparison(names[0], column, reference.name, differences, (reference, *others), tuple(names))
+    names = unique([described(r) for r in (reference, *others)])
+    base = Curves(names[0], first, quantity or default_quantity(first[0]))
+    found = {name: difference(base, name, other, points) for name, other in zip(names[1:], others)}
+    return Comparison(
+        names[0], base.quantity, base.parameter, found, tuple(drawn(base.quantity, r) for r in (reference, *others)),
+        tuple(names),
+    )  # fmt: skip
 
 
-def _default_quantity(reference: Branch) -> str:
-    for name in reference.columns:
-        if name.endswith(".amplitude(1)"):
-            return name
-    for name in reference.columns:
-        if name.endswith(("_amplitude", ".max")):
-            return name
-    raise InputError("the reference has no amplitude column: give quantity=...")
+def difference(base: Curves, name: str, other: Any, points: int) -> Difference:
+    """One method, its branches or its sweep, against the reference."""
+    branches = _several(other)
+    own = other.name if branches is None else branches[0].name
+    if own != base.parameter:
+        raise InputError(f"'{name}' runs along {own}, the reference along {base.parameter}")
+    if branches is None:
+        return _sweep_difference(name, base, other)
+    return _branch_difference(name, base, Curves(name, branches, base.quantity), points)
 
 
-def _column(branch: Branch, quantity: str) -> str:
-    """The branch's own name of the quantity."""
-    if quantity in branch.columns:
-        return quantity
-    stem = quantity.removesuffix(".amplitude(1)").removesuffix("_amplitude")
-    for alias in (f"{stem}_amplitude", f"{stem}.amplitude(1)"):
-        if alias in branch.columns:
-            return alias
-    raise unknown_name("column", quantity, branch.columns, "a compared branch")
+def drawn(quantity: str, result: Any) -> Any:
+    """The result with the quantity among its columns, for the plot."""
+    branches = _several(result)
+    return result if branches is None else Curves("", branches, quantity).drawable()
 
 
-def _method(result: Any) -> str:
-    if isinstance(result, Sweep):
-        lo, hi = result.window
-        return f"sweep {'up' if hi > lo else 'down'}"
-    spec = result.meshes[0] if isinstance(result.meshes[0], dict) else result.meshes[0].spec
-    problem = str(result.method.get("problem", "branch"))
-    if problem == "HarmonicBalance":
-        return f"harmonic balance {spec.get('harmonics', '')}".strip()
-    if problem == "Equilibrium":
-        system = getattr(result.meshes[0], "system", None)
-        described = system.name if system is not None else "equilibria"
-        for word in ("averaging", "multiple scales"):
-            if word in described:
-                return word
-        return "equilibria"
-    return problem.lower()
+def _several(result: Any) -> tuple[Branch, ...] | None:
+    """The branches of a method; None for what is no branch."""
+    if isinstance(result, Branch):
+        return (result,)
+    if isinstance(result, Sequence) and result and all(isinstance(b, Branch) for b in result):
+        return tuple(result)
+    return None
 
 
-def _names(results: list[Any]) -> list[str]:
-    """A name for each result; equal ones get a number."""
-    plain = [_method(r) for r in results]
-    names: list[str] = []
-    for k, name in enumerate(plain):
-        count = plain[:k].count(name)
-        names.append(name if count == 0 else f"{name} ({count + 1})")
-    return names
-
-
-def _rows(branch: Branch, value: float, column: str) -> list[tuple[Verdict, float]]:
-    return [(row["verdict"], float(row[column])) for row in branch.rows_at(**{branch.name: value})]
-
-
-def _branch_difference(name: str, reference: Branch, base: str, other: Branch, column: str, points: int) -> Difference:
-    low = max(reference.parameter.min(), other.parameter.min())
-    high = min(reference.parameter.max(), other.parameter.max())
+def _branch_difference(name: str, base: Curves, other: Curves, points: int) -> Difference:
+    (a, b), (c, d) = base.bounds, other.bounds
+    low, high = max(a, c), min(b, d)
     if not low < high:
-        raise InputError(f"'{name}' and the reference have no value of {reference.name} in common")
+        raise InputError(f"'{name}' and the reference have no value of {base.parameter} in common")
     matches: list[tuple[float, float, float, Verdict]] = []
     missing: list[tuple[float, Verdict, float]] = []
     extra: list[tuple[float, Verdict, float]] = []
-    for value in np.linspace(low, high, points):
-        here, there = _rows(reference, value, base), _rows(other, value, column)
+    for value in np.linspace(low, high, points).tolist():
+        here, there = base.rows(value), other.rows(value)
         pairs, alone, more = matched(here, there)
-        matches += [(float(value), here[i][1], there[j][1], here[i][0]) for i, j in pairs]
-        missing += [(float(value), here[i][0], here[i][1]) for i in alone]
-        extra += [(float(value), there[j][0], there[j][1]) for j in more]
-    return _difference(name, matches, missing, extra, _folds(reference, other))
+        matches += [(value, here[i][1], there[j][1], here[i][0]) for i, j in pairs]
+        missing += [(value, here[i][0], here[i][1]) for i in alone]
+        extra += [(value, there[j][0], there[j][1]) for j in more]
+    return _difference(name, matches, missing, extra, _folds(base.folds, other.folds))
 
 
-def _sweep_difference(name: str, reference: Branch, base: str, sweep: Sweep, quantity: str) -> Difference:
-    stem, _, measure = quantity.rpartition(".")
+def _sweep_difference(name: str, base: Curves, sweep: Sweep) -> Difference:
+    stem, _, measure = base.quantity.rpartition(".")
     sources = {"amplitude(1)": sweep.amplitude(1), "max": sweep.maximum, "min": sweep.minimum}
     if measure not in sources:
-        raise InputError(f"a sweep has no {quantity}: compare <state>.amplitude(1), <state>.max or <state>.min")
-    values = sources[measure][stem]
+        raise InputError(f"a sweep has no {base.quantity}: compare <state>.amplitude(1), <state>.max or <state>.min")
+    values, (low, high) = sources[measure][stem], base.bounds
     matches: list[tuple[float, float, float, Verdict]] = []
-    missing: list[tuple[float, Verdict, float]] = []
     extra: list[tuple[float, Verdict, float]] = []
-    for value, seen, settled in zip(sweep.parameter, values, sweep.settled):
-        if not settled or not reference.parameter.min() <= value <= reference.parameter.max():
+    for value, seen, settled in zip(sweep.parameter.tolist(), values.tolist(), sweep.settled):
+        if not settled or not low <= value <= high:
             continue
-        here = [row for row in _rows(reference, float(value), base) if row[0] is not Verdict.UNSTABLE]
+        here = [row for row in base.rows(value) if row[0] is not Verdict.UNSTABLE]
         if here:
             verdict, nearest = min(here, key=lambda row: abs(row[1] - seen))
-            matches.append((float(value), nearest, float(seen), verdict))
+            matches.append((value, nearest, seen, verdict))
         else:
-            extra.append((float(value), Verdict.STABLE, float(seen)))
-    return _difference(name, matches, missing, extra, ())
+            extra.append((value, Verdict.STABLE, seen))
+    return _difference(name, matches, [], extra, ())
 
 
 def _difference(name: str, matches: list[Any], missing: list[Any], extra: list[Any], folds: Any) -> Difference:
@@ -186,9 +157,7 @@ def _difference(name: str, matches: list[Any], missing: list[Any], extra: list[A
     )  # fmt: skip
 
 
-def _folds(reference: Branch, other: Branch) -> list[tuple[float, float]]:
+def _folds(here: list[float], there: list[float]) -> list[tuple[float, float]]:
     """The reference's folds with the nearest of the other's, each used once."""
-    here = sorted(p.params[reference.name] for p in reference.of_kind(Kind.FOLD))
-    there = [p.params[other.name] for p in other.of_kind(Kind.FOLD)]
     pairs, left, _ = matched([(Verdict.STABLE, x) for x in here], [(Verdict.STABLE, x) for x in there])
     return [(here[i], there[j]) for i, j in pairs] + [(here[i], float("nan")) for i in left]

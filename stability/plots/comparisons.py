@@ -44,11 +44,11 @@ def plot_comparison(comparison: Comparison, ax: Any = None) -> list[Any]:
                 markersize=3.0, markerfacecolor="none", linestyle="none", label=name,
             )  # fmt: skip
             continue
-        column = comparison.quantity if comparison.quantity in curve.columns else f"{stem}_amplitude"
+        look: dict[str, Any] = {"color": colours[(k - 1) % len(colours)], "kinds": ()}
         if k == 0:
-            artists += plot_branch(curve, ax=ax, y=column, color=COLOURS["grey"], linewidth=3.0, label=name)
-        else:
-            artists += plot_branch(curve, ax=ax, y=column, color=colours[(k - 1) % len(colours)], kinds=(), label=name)
+            look = {"color": COLOURS["grey"], "linewidth": 3.0}
+        for i, branch in enumerate(curve):
+            artists += plot_branch(branch, ax=ax, y=comparison.quantity, label=None if i else name, **look)
     ax.set_xlabel(axis_label(comparison.parameter_name))
     ax.set_ylabel(f"amplitude of {axis_label(stem)}" if measure == "amplitude(1)" else axis_label(comparison.quantity))
     ax.legend(frameon=False, fontsize="small")
