@@ -24,7 +24,7 @@ from numba.core import cgutils
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-__all__ = ["call_field", "native_address", "native_call"]
+__all__ = ["call_field", "call_solver", "native_address", "native_call", "solver_address"]
 
 _DOUBLE = ir.DoubleType()
 _INT64 = ir.IntType(64)
@@ -50,6 +50,33 @@ def call_field(typingctx, address, count, phase, X, P, stride, F, J, Fp):  # typ
         call = _function(builder, args[0], [_INT64, pointer, pointer, pointer, _INT64, pointer, pointer, pointer])
         data = [_data(context, builder, sig.args[k], args[k]) for k in (2, 3, 4, 6, 7, 8)]
         builder.call(call, [args[1], data[0], data[1], data[2], args[5], data[3], data[4], data[5]])
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+def solver_address() -> int:
+    """Address of LAPACK's dgesv, from scipy, for `call_solver`."""
+    import scipy.linalg.cython_lapack  # noqa: F401 - the address is looked up in the imported module
+    from numba.extending import get_cython_function_address
+
+    return int(get_cython_function_address("scipy.linalg.cython_lapack", "dgesv"))
+
+
+@intrinsic
+def call_solver(typingctx, address, sizes, A, pivots, B):  # type: ignore[no-untyped-def]
+    """``dgesv`` at an address: A (n, n) and B (k, n) hold columns as rows and become the factors and the solutions.
+
+    sizes (3,) int32: n, k, and LAPACK's info, which is set (0: solved); pivots (n,) int32, counted from 1.
+    """
+    signature = types.void(types.int64, sizes, A, pivots, B)
+
+    def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        double, integer = _DOUBLE.as_pointer(), ir.IntType(32).as_pointer()
+        call = _function(builder, args[0], [integer, integer, double, integer, integer, double, integer, integer])
+        data = [_data(context, builder, sig.args[k], args[k]) for k in range(1, 5)]
+        n, count, info = (builder.gep(data[0], [ir.Constant(_INT64, k)]) for k in range(3))
+        builder.call(call, [n, count, data[1], n, data[2], data[3], n, info])
         return context.get_dummy_value()
 
     return signature, codegen

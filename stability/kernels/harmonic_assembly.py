@@ -1,9 +1,15 @@
-r"""Residual, Jacobian and parameter column of a harmonic-balance problem in one compiled call.
+r"""Residual, Jacobian and parameter column of a harmonic-balance problem, by loops inside a compiled kernel.
 
-The same quantities as problems/harmonic_linearisation.py, which states the equations; here by loops, because at 7
-harmonics numpy's calls cost ten times the arithmetic. Layout: coefficient e of series r at e q + r; q series,
-M = 2H + 1 coefficients, N samples, n states. `velocities[r]` is the state that is omega x_r', or -1 for a series of
-first order. T(j) = Toeplitz + Hankel by the tables `first`, `second` of kernels/fourier.py.
+The same quantities as problems/harmonic_linearisation.py, which states the equations. Layout: coefficient e of series r
+at e q + r; q series, M = 2H + 1 coefficients, N samples, n states. `velocities[r]` is the state that is omega x_r', or
+-1 for a series of first order. T(j) = Toeplitz + Hankel by the tables `first`, `second` of kernels/fourier.py; where
+an entry of the Jacobian is the same at all samples (a linear term), T(j) = j I.
+
+Arrays travel in three tuples:
+
+    tables = (points, synthesis, slope, analysis, spectrum, first, second, swap, turn, k)      of the Fourier basis
+    layout = (rows, unknowns, velocities, winding)
+    work   = (X, F, J, Fp, dT, R, by_omega, column, A)                                         filled here
 """
 
 from __future__ import annotations
@@ -13,7 +19,33 @@ import numpy as np
 from stability.kernels.addresses import call_field
 from stability.kernels.caching import kernel
 
-__all__ = ["assemble"]
+__all__ = ["assemble", "multiply", "states"]
+
+
+@kernel(inline=True)
+def multiply(A, B, out):  # type: ignore[no-untyped-def]
+    """out = A B, in the order that keeps rows of B together."""
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            out[i, j] = 0.0
+        for k in range(B.shape[0]):
+            factor = A[i, k]
+            for j in range(out.shape[1]):
+                out[i, j] += factor * B[k, j]
+
+
+@kernel(inline=True)
+def states(G, slope, s, c, omega, layout, X):  # type: ignore[no-untyped-def]
+    """X (N, n) of the coefficients c at the points s with matrices G and G D."""
+    _, unknowns, velocities, winding = layout
+    x, v = np.empty((G.shape[0], c.shape[1])), np.empty((G.shape[0], c.shape[1]))
+    multiply(G, c, x)
+    multiply(slope, c, v)
+    for i in range(G.shape[0]):
+        for r in range(c.shape[1]):
+            X[i, unknowns[r]] = x[i, r] + s[i] * winding[r]
+            if velocities[r] >= 0:
+                X[i, velocities[r]] = omega * (v[i, r] + winding[r] / (2.0 * np.pi))
 
 
 @kernel(inline=True)
@@ -28,54 +60,87 @@ def _linear(k, order_two, c, e, r, omega, power):  # type: ignore[no-untyped-def
 
 
 @kernel(inline=True)
-def _states(G, slope, s, c, omega, unknowns, velocities, winding, X):  # type: ignore[no-untyped-def]
-    """X (N, n) of the coefficients."""
-    N, M = G.shape
+def _residual(tables, layout, work, c, omega, rate, index):  # type: ignore[no-untyped-def]
+    """R, its derivative by omega, and the column of parameter `index`, whose frequency has the slope `rate`."""
+    _, _, _, analysis, _, _, _, _, _, k = tables
+    rows, _, velocities, winding = layout
+    X, F, J, Fp, _, R, by_omega, column, _ = work
+    N, q, M = X.shape[0], rows.shape[0], analysis.shape[0]
+    # columns: forces, their slopes by the parameter, those by the velocities' common factor omega
+    samples, found = np.zeros((N, 3 * q)), np.empty((M, 3 * q))
     for i in range(N):
-        for r in range(unknowns.shape[0]):
-            x, v = 0.0, 0.0
-            for e in range(M):
-                x += G[i, e] * c[e, r]
-                v += slope[i, e] * c[e, r]
-            X[i, unknowns[r]] = x + s[i] * winding[r]
-            if velocities[r] >= 0:
-                X[i, velocities[r]] = omega * (v + winding[r] / (2.0 * np.pi))
+        for r in range(q):
+            samples[i, r] = F[i, rows[r]]
+            samples[i, q + r] = Fp[i, rows[r], index] if Fp.shape[2] else 0.0
+            for j in range(q):
+                if velocities[j] >= 0:
+                    samples[i, 2 * q + r] += J[i, rows[r], velocities[j]] * X[i, velocities[j]] / omega
+    multiply(analysis, samples, found)
+    for r in range(q):
+        second_order = velocities[r] >= 0
+        for e in range(M):
+            straight = winding[r] / (2.0 * np.pi) if e == 0 and not second_order else 0.0
+            R[e * q + r] = _linear(k, second_order, c, e, r, omega, 0) + omega * straight - found[e, r]
+            by_omega[e * q + r] = _linear(k, second_order, c, e, r, omega, 1) + straight - found[e, 2 * q + r]
+            column[e * q + r] = rate * by_omega[e * q + r] - found[e, q + r]
 
 
 @kernel(inline=True)
-def _add_product(spectrum, first, second, J, row, state, places, turns, r, j, table, A):  # type: ignore[no-untyped-def]
-    """A[block r, j] -= T(J_(row, state)) with columns taken from `places` and multiplied by `turns` (D, or nothing)."""
-    harmonics, N = spectrum.shape[0] - 2, J.shape[0]
-    q_times = table.shape[0]
-    for h in range(harmonics):
-        value = 0.0
-        for i in range(N):
-            value += spectrum[h, i] * J[i, row, state]
-        if h > 0:
-            value *= 0.5
-        table[h], table[harmonics + h] = value, -value
-    table[q_times - 1] = 0.0
-    M = first.shape[0]
-    q = (A.shape[0] - A.shape[0] % M) // M
-    for e in range(M):
-        factor = 0.5 if e == 0 else 1.0
-        for m in range(M):
-            place = places[m]
-            A[e * q + r, m * q + j] -= factor * turns[m] * (table[first[e, place]] + table[second[e, place]])
+def _is_constant(J, row, state):  # type: ignore[no-untyped-def]
+    for i in range(1, J.shape[0]):
+        if J[i, row, state] != J[0, row, state]:
+            return False
+    return True
 
 
-@kernel
-def assemble(  # type: ignore[no-untyped-def]
-    field, period, multiple, phase, s, G, slope, analysis, spectrum, first, second, swap, turn, k, rows, unknowns,
-    velocities, winding, P, index, c, T, X, F, J, Fp, dT, R, by_omega, column, A,
-):  # fmt: skip
-    """Fill X, F, J, Fp, dT (m,), R, by_omega, column (M q,) and A (M q, M q); returns the orbit's period.
+@kernel(inline=True)
+def _jacobian(tables, layout, J, omega, A):  # type: ignore[no-untyped-def]
+    """A = omega^r D^r - T(J_x) - omega T(J_v) D."""
+    _, _, _, _, spectrum, first, second, swap, turn, k = tables
+    rows, unknowns, velocities, _ = layout
+    M, q, N, harmonics = first.shape[0], rows.shape[0], J.shape[0], spectrum.shape[0] - 2
+    table, values, found = np.zeros(2 * harmonics + 1), np.empty((N, 1)), np.empty((harmonics, 1))
+    A[:] = 0.0
+    for r in range(q):
+        for j in range(q):
+            for which in range(2):
+                state = unknowns[j] if which == 0 else velocities[j]
+                if state < 0:
+                    continue
+                if _is_constant(J, rows[r], state):
+                    value = J[0, rows[r], state]
+                    for m in range(M if value != 0.0 else 0):
+                        place, factor = (m, 1.0) if which == 0 else (swap[m], turn[m] * omega)
+                        A[place * q + r, m * q + j] -= factor * value
+                    continue
+                for i in range(N):
+                    values[i, 0] = J[i, rows[r], state]
+                multiply(spectrum[:harmonics], values, found)
+                for h in range(harmonics):
+                    value = found[h, 0] if h == 0 else 0.5 * found[h, 0]
+                    table[h], table[harmonics + h] = value, -value
+                for e in range(M):
+                    half = 0.5 if e == 0 else 1.0
+                    for m in range(M):
+                        place, factor = (m, half) if which == 0 else (swap[m], half * turn[m] * omega)
+                        A[e * q + r, m * q + j] -= factor * (table[first[e, place]] + table[second[e, place]])
+        for e in range(M):
+            if velocities[r] >= 0:
+                A[e * q + r, e * q + r] -= omega * omega * k[e] * k[e]
+            elif e % 2 == 1:
+                A[e * q + r, (e + 1) * q + r] += omega * k[e]
+                A[(e + 1) * q + r, e * q + r] -= omega * k[e]
+
+
+@kernel(inline=True)
+def assemble(field, period, multiple, phase, tables, layout, work, P, index, c, T):  # type: ignore[no-untyped-def]
+    """Fill `work`; returns the orbit's period.
 
     `period` is the address of the forcing period (0: autonomous, then T is the period and dT stays zero); `index` the
     parameter of `column`.
     """
-    N, M = G.shape
-    q, m = rows.shape[0], P.shape[0]
+    X, F, J, Fp, dT, _, _, _, A = work
+    m = P.shape[0]
     if period != 0:
         zero, value, slopes = np.zeros((1, 1)), np.empty((1, 1)), np.empty((1, 1, m))
         call_field(period, 1, zero[0], zero, P, 0, value, np.empty((1, 1, 1)), slopes)
@@ -83,44 +148,9 @@ def assemble(  # type: ignore[no-untyped-def]
         for i in range(m):
             dT[i] = multiple * slopes[0, 0, i]
     omega = 2.0 * np.pi / T
-    rate = -omega / T * dT[index] if period != 0 else 0.0
-    _states(G, slope, s, c, omega, unknowns, velocities, winding, X)
-    call_field(field, N, phase, X, P, 0, F, J, Fp)
-    through = np.zeros((N, q))
-    for i in range(N):
-        for r in range(q):
-            for j in range(q):
-                if velocities[j] >= 0:
-                    through[i, r] += J[i, rows[r], velocities[j]] * X[i, velocities[j]] / omega
-    for r in range(q):
-        second_order = velocities[r] >= 0
-        for e in range(M):
-            force, moved, pushed = 0.0, 0.0, 0.0
-            for i in range(N):
-                force += analysis[e, i] * F[i, rows[r]]
-                moved += analysis[e, i] * Fp[i, rows[r], index]
-                pushed += analysis[e, i] * through[i, r]
-            straight = winding[r] / (2.0 * np.pi) if e == 0 and not second_order else 0.0
-            R[e * q + r] = _linear(k, second_order, c, e, r, omega, 0) + omega * straight - force
-            by_omega[e * q + r] = _linear(k, second_order, c, e, r, omega, 1) + straight - pushed
-            column[e * q + r] = rate * by_omega[e * q + r] - moved
-    A[:] = 0.0
-    places, turns = np.empty((2, M), np.int64), np.ones((2, M))
-    for e in range(M):
-        places[0, e], places[1, e], turns[1, e] = e, swap[e], turn[e] * omega
-    table = np.empty(2 * (spectrum.shape[0] - 2) + 1)
-    for r in range(q):
-        for j in range(q):
-            for which in range(2):
-                state = unknowns[j] if which == 0 else velocities[j]
-                if state >= 0:
-                    _add_product(
-                        spectrum, first, second, J, rows[r], state, places[which], turns[which], r, j, table, A
-                    )
-        for e in range(M):
-            if velocities[r] >= 0:
-                A[e * q + r, e * q + r] -= omega * omega * k[e] * k[e]
-            elif e % 2 == 1:
-                A[e * q + r, (e + 1) * q + r] += omega * k[e]
-                A[(e + 1) * q + r, e * q + r] -= omega * k[e]
+    rate = -omega / T * dT[index] if period != 0 and m > 0 else 0.0
+    states(tables[1], tables[2], tables[0], c, omega, layout, X)
+    call_field(field, X.shape[0], phase, X, P, 0, F, J, Fp)
+    _residual(tables, layout, work, c, omega, rate, index)
+    _jacobian(tables, layout, J, omega, A)
     return T

@@ -30,7 +30,7 @@ class BackboneLinearisation:
 
     def __init__(self, problem: Backbone, u: Array, params: Array) -> None:
         self.problem, self.u, self.params = problem, u, params
-        self.inner = HarmonicLinearisation(problem.inner, u[:-1].copy(), np.append(params[:-1], u[-1]))
+        self.inner = HarmonicLinearisation.at(problem.inner, u[:-1], np.append(params[:-1], u[-1]))
 
     @cached_property
     def residual(self) -> Array:

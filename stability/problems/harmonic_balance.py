@@ -25,14 +25,15 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dgesv
 
 from ..errors import InputError
+from ..kernels.addresses import solver_address
 from ..kernels.gauss import gauss_rule
+from ..kernels.harmonic_newton import CONVERGED, NEGATIVE_PERIOD, NO_CONVERGENCE, NOT_FINITE, SINGULAR, newton
 from ..protocols import Corrected, Spectrum, Tangent
 from ..systems.stops import refuse_stops
 from .harmonic_layout import HarmonicLayout
-from .harmonic_linearisation import HarmonicLinearisation
+from .harmonic_linearisation import HarmonicLinearisation, HarmonicWork
 from .harmonic_samples import first_samples, polynomial_degree
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
 
@@ -41,7 +42,8 @@ __all__ = ["HarmonicBalance"]
 Array = np.ndarray
 _MAX_ITERATIONS = {True: 30, False: 8}
 _DENSE_DEGREE = 9
-_SETTLED = 1e-12
+_SETTLED = 1e-12  # multipliers belong to the point itself, not to the last iterate
+_NOTES = {NO_CONVERGENCE: "no convergence", SINGULAR: "singular", NEGATIVE_PERIOD: "the period became negative"}
 _MAX_HARMONICS, _MAX_SAMPLES = 1000, 65536
 
 
@@ -248,87 +250,58 @@ class HarmonicBalance(OrbitDiscretisation):
         known = self._memo.get("last")
         if known is not None and np.array_equal(known[0], u) and np.array_equal(known[1].params, params):
             return known[1]  # type: ignore[no-any-return]
-        return HarmonicLinearisation(self, np.array(u, float), np.array(params, float))
+        return HarmonicLinearisation.at(self, u, params)
+
+    @cached_property
+    def _fixed(self) -> tuple[Any, ...]:
+        """Arguments of the kernel that never change: solver, field, period, multiple, phase, tables, layout; sizes."""
+        flow, layout, b = self.flow, self.layout, self.layout.basis
+        tables = b.points, b.synthesis, b.slope, b.analysis, b.spectrum, b.first, b.second, b.swap, b.turn, b.k
+        kept = layout.rows, layout.unknowns, layout.velocities, layout.turns
+        head = solver_address(), flow.address, flow.period_address, float(self.multiple), self.phase, tables, kept
+        return head, self.weights, self.row_sizes, np.zeros(self.size)
+
+    def newton(
+        self, u: Array, params: Array, index: int, tangent: Tangent | None, ds: float, tolerance: float, most: int
+    ) -> tuple[HarmonicWork, int, int, tuple[float, int], float]:
+        """The compiled solve, u and params corrected in place: (work, status, iterations, (residual, sign), period)."""
+        head, weights, row_sizes, nothing = self._fixed
+        arc = 0 if tangent is None else 1
+        work = HarmonicWork(self.layout, len(params), self.own, arc)
+        t = nothing if tangent is None else np.ascontiguousarray(tangent.u, float)
+        rate, weight = (0.0, 1.0) if tangent is None else (float(tangent.parameter), float(tangent.weight))
+        status, iterations, residual, sign, period = newton(
+            *head, work.filled, params, index, u, weights, row_sizes, t, rate, weight, arc, float(ds),
+            float(tolerance), _SETTLED, most, work.full, work.pivots, work.x,
+        )
+        return work, status, iterations, (residual, sign), period
 
     def correct(
         self, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
     ) -> Corrected:
-        """The bordered Newton solve of `protocols.Problem`."""
-        index, w, size = self.index(free), self.weights, self.size
-        given, given_p = np.array(u, float), np.array(params, float)
-        u, params = given.copy(), given_p.copy()
-        if tangent is not None:
-            u, params[index] = u + ds * tangent.u, params[index] + ds * tangent.parameter
-            row, pull = w * tangent.u, tangent.weight**2 * tangent.parameter
-        border = 0 if tangent is None else 1
-        A, right = np.zeros((size + border, size + border)), np.zeros((size + border, 2))
-        previous, residual, note, iteration = np.inf, np.inf, "no convergence", 0
-        for iteration in range(1, _MAX_ITERATIONS[tangent is None] + 1):
-            if self.own and not u[-1] > 0:
-                note = "the period became negative"
-                break
-            L = HarmonicLinearisation(self, u.copy(), params.copy(), given if self.own else None, index)
-            residual = L.size_of_residual
-            if not residual < np.inf:
-                note = L.complaint
-                break
-            A[:size, :size] = L.matrix
-            right[:size, 0] = -L.residual
-            column = L.column(free)
-            if tangent is None:
-                right[:size, 1] = -column
-            else:
-                A[:size, size], A[size, :size], A[size, size] = column, row, pull
-                right[size] = ds - row @ (u - given) - pull * (params[index] - given_p[index]), 1.0
-            solved = factored(A * self._row_scales(border), right * self._row_scales(border))
-            if solved is None:
-                note = "singular"
-                break
-            x, factors = solved
-            step = x[:size, 0]
-            change_l = float(x[-1, 0]) if border else 0.0
-            change = float(np.sqrt(w @ step**2 + ((tangent.weight * change_l) ** 2 if tangent is not None else 0.0)))
-            length = float(np.sqrt(w @ u**2))
-            damping = 1.0
-            if tangent is None and change > 0.5 * (1 + length):
-                damping = 0.5 * (1 + length) / change
-            if self.own and step[-1] < -0.5 * u[-1]:
-                damping = min(damping, -0.5 * u[-1] / step[-1])
-            u, params[index] = u + damping * step, params[index] + damping * change_l
-            if change <= tolerance * (1 + length):
-                if change > _SETTLED * (1 + length):  # multipliers belong to the point itself, not to the last iterate
-                    L = HarmonicLinearisation(self, u.copy(), params.copy(), given if self.own else None, index)
-                    residual = L.size_of_residual
-                self._memo["last"] = (u, L) if L.reference is None else None
-                return self._corrected(u, params, x, tangent, residual, iteration, L, factors)
-            if tangent is not None and iteration > 1 and change > 2 * previous:
-                break
-            previous = change
-        return Corrected(u, params, None, residual, iteration, 0, None, False, note)
+        """The bordered Newton solve of `protocols.Problem`.
 
-    def _row_scales(self, border: int) -> Array:
-        known = self._memo.get("rows")
-        if known is None:
-            known = self._memo["rows"] = (1.0 / np.append(self.row_sizes, 1.0))[:, None]
-        return known if border else known[:-1]
-
-    def _corrected(
-        self, u: Array, params: Array, x: Array, tangent: Tangent | None, residual: float, iterations: int,
-        L: HarmonicLinearisation, factors: tuple[Array, Array],
-    ) -> Corrected:  # fmt: skip
-        """The row of the given tangent stays in the determinant: with the new one it has the same sign, since both
-        have a positive product with the null vector x of [F_u, F_lambda]."""
-        w = self.weights
+        The row of the given tangent stays in the determinant: with the new one it has the same sign, since both have a
+        positive product with the null vector x of [F_u, F_lambda].
+        """
+        index = self.index(free)
+        given, u, params = u, np.array(u, float), np.array(params, float)
+        work, status, iterations, (residual, sign), period = self.newton(
+            u, params, index, tangent, ds, tolerance, _MAX_ITERATIONS[tangent is None]
+        )
+        reference = np.array(given, float) if self.own else None
+        factors = None if tangent is None else (work.full.T, work.pivots - 1)
+        L = HarmonicLinearisation(self, u, params, work, period, index, reference, factors)
+        if status != CONVERGED:
+            note = L.complaint if status == NOT_FINITE else _NOTES[status]
+            return Corrected(u, params, None, residual, iterations, 0, None, False, note)
+        x = work.x[1]
         if tangent is None:
-            new = Tangent(x[:, 1].copy(), 1.0, 1.0)
+            new = Tangent(x, 1.0, 1.0)
         else:
-            t, k = x[: self.size, 1], float(x[-1, 1])
-            length = float(np.sqrt(w @ t**2 + (tangent.weight * k) ** 2))
-            new = Tangent(t / length, k / length, tangent.weight)
-            self._memo["factors"] = (u, L.u, factors)
-        lu, pivots = factors
-        odd = (np.count_nonzero(np.diagonal(lu) < 0) + np.count_nonzero(pivots != np.arange(len(pivots)))) % 2
-        return Corrected(u, params, new, residual, iterations, -1 if odd else 1, L, True)
+            new = Tangent(x[:-1], float(x[-1]), tangent.weight)
+        self._memo["last"] = (u, L) if reference is None else None
+        return Corrected(u, params, new, residual, iterations, sign, L, True)
 
     # ------------------------------------------------------------------ spectrum, error, adaption
     def spectrum(self, linearisation: HarmonicLinearisation) -> Spectrum:
@@ -374,9 +347,3 @@ class HarmonicBalance(OrbitDiscretisation):
             raise unknown_name("unknown series", state, names, "this problem")
         c = self.coefficients(u)[:, names.index(state)]
         return np.concatenate([c[:1].astype(complex), 0.5 * (c[1::2] - 1j * c[2::2])])
-
-
-def factored(A: Array, right: Array) -> tuple[Array, tuple[Array, Array]] | None:
-    """x of A x = right, and the factors (LU, pivots from 0); None where A is singular or the result not finite."""
-    lu, pivots, x, info = dgesv(A, right)
-    return (x, (lu, pivots)) if info == 0 and np.isfinite(x).all() else None

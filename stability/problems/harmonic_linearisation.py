@@ -22,40 +22,56 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..kernels.fourier import derivative
-from ..kernels.harmonic_assembly import assemble
 
 if TYPE_CHECKING:
     from .harmonic_balance import HarmonicBalance
 
-__all__ = ["HarmonicLinearisation"]
+__all__ = ["HarmonicLinearisation", "HarmonicWork"]
 
 Array = np.ndarray
 
 
+class HarmonicWork:
+    """The arrays a kernel fills at one linearisation (see kernels/harmonic_assembly), and the factors of its solve."""
+
+    __slots__ = ("filled", "full", "pivots", "x")
+
+    def __init__(self, layout: Any, m: int, own: int, border: int) -> None:
+        N, n, size = layout.samples, layout.n, layout.count * layout.q
+        self.filled = (
+            np.empty((N, n)), np.empty((N, n)), np.empty((N, n, n)), np.empty((N, n, m)), np.zeros(m), np.empty(size),
+            np.empty(size), np.empty(size), np.empty((size, size)),
+        )  # fmt: skip
+        order = size + own + border
+        self.full, self.pivots, self.x = np.empty((order, order)), np.empty(order, np.int32), np.empty((2, order))
+
+
 class HarmonicLinearisation:
-    """F, F_u and spectral data at (u, p); see `protocols.Linearisation`."""
+    """F, F_u and spectral data at (u, p); see `protocols.Linearisation`.
+
+    `factors`: (LU, pivots from 0) of F_u bordered by a column and the tangent, of an iterate within the solve's last
+    correction of (u, p), or None.
+    """
 
     def __init__(
-        self, problem: HarmonicBalance, u: Array, params: Array, reference: Array | None = None, index: int = 0
-    ) -> None:
-        layout, basis = problem.layout, problem.layout.basis
+        self, problem: HarmonicBalance, u: Array, params: Array, work: HarmonicWork, period: float, index: int = 0,
+        reference: Array | None = None, factors: tuple[Array, Array] | None = None,
+    ) -> None:  # fmt: skip
+        layout = problem.layout
         self.problem, self.u, self.params = problem, u, params
-        self.reference = reference
-        size = layout.count * layout.q
-        self.c = u[:size].reshape(layout.count, layout.q)
-        N, n, m = layout.samples, layout.n, len(params)
-        self.X, self.F, self.J, self.Fp = np.empty((N, n)), np.empty((N, n)), np.empty((N, n, n)), np.empty((N, n, m))
-        self.period_slopes, self.balance = np.zeros(m), np.empty(size)
-        self.by_omega, self.by_index, self.by_coefficients = np.empty(size), np.empty(size), np.empty((size, size))
-        self.index = index
-        self.period = assemble(
-            problem.flow.address, problem.flow.period_address, float(problem.multiple), problem.phase, basis.points,
-            basis.synthesis, basis.slope, basis.analysis, basis.spectrum, basis.first, basis.second, basis.swap,
-            basis.turn, basis.k, layout.rows, layout.unknowns, layout.velocities, layout.turns, params, index, self.c,
-            float(u[-1]) if problem.own else 0.0, self.X, self.F, self.J, self.Fp, self.period_slopes, self.balance,
-            self.by_omega, self.by_index, self.by_coefficients,
-        )  # fmt: skip
-        self.omega = 2 * np.pi / self.period
+        self.reference, self.factors, self.index = reference, factors, index
+        self.c = u[: layout.count * layout.q].reshape(layout.count, layout.q)
+        self.X, self.F, self.J, self.Fp, self.period_slopes = work.filled[:5]
+        self.balance, self.by_omega, self.by_index, self.by_coefficients = work.filled[5:]
+        self.period = period
+        self.omega = 2 * np.pi / period
+
+    @classmethod
+    def at(cls, problem: HarmonicBalance, u: Array, params: Array) -> HarmonicLinearisation:
+        """At any u and p, copied."""
+        u, params = np.array(u, float), np.array(params, float)
+        work, _, _, _, period = problem.newton(u, params, 0, None, 0.0, 0.0, 0)
+        return cls(problem, u, params, work, period)
 
     # ------------------------------------------------------------------ residual
     @cached_property

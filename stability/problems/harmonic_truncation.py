@@ -157,9 +157,8 @@ def _lower_step(L: HarmonicLinearisation, force: Array) -> Array | None:
     sides = force.shape[1]
     if problem.own:
         force = np.vstack([force, np.zeros((1, sides))])
-    known = problem._memo.get("factors")
-    if known is not None and (known[1] is L.u or np.array_equal(known[0], L.u)):
-        lu, pivots = known[2]
+    if L.factors is not None:
+        lu, pivots = L.factors
         x = dgetrs(lu, pivots, np.vstack([force / problem.row_sizes[:, None], np.zeros((1, sides))]))[0][:-1]
     else:
         x, *_ = np.linalg.lstsq(L.core, force / problem.row_sizes[:, None], rcond=1e-7)
