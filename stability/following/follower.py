@@ -57,6 +57,7 @@ class Follower(Iterator[Point]):
         since_adapt: int = 0, home: Home | None = None, mirrored: bool = False, rate: float = 0.0,
     ) -> None:
         self.settings, self.last, self.before = settings, first, before
+        self._twin: Point | None = None  # `last` before its mesh was adapted
         self.length = settings.steps.first if length is None else length
         self.since_adapt = since_adapt
         self.entries: list[Entry] = []
@@ -114,7 +115,7 @@ class Follower(Iterator[Point]):
                 continue
             if self._monitor.alone:
                 return *made, []
-            found, doubtful = between(self.locator, self.before, self.last, made[0])
+            found, doubtful = between(self.locator, self.before, self.last, made[0], self._twin)
             found = [f for f in found if not self._known(f)]
             strange = any(f.kind is Kind.UNEXPLAINED for f in found)
             if not (strange or doubtful) or doubts >= _PATIENCE:
@@ -210,7 +211,7 @@ class Follower(Iterator[Point]):
             self.status = Status.PARAMETER_BOUND
         elif self._runaway(point):
             self.status = Status.DIVERGED
-        self.before, self.last = last, point
+        self.before, self.last, self._twin = last, point, None
         self.since_adapt += 1
         if self.since_adapt >= _ADAPT_EVERY and self.status is None:
             self._adapt()
@@ -285,7 +286,7 @@ class Follower(Iterator[Point]):
             return  # an event lies within the discretisation error: leave the mesh until it is passed
         self._growth *= self._norm_of(old) / max(self._norm_of(new), 1e-300)
         self.since_adapt = 0
-        self.last = new
+        self.last, self._twin = new, old
         where = next(i for i in range(len(self.entries) - 1, -1, -1) if self.entries[i].point is old)
         self.entries[where] = Entry(new, self.entries[where].found)
 

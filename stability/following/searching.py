@@ -3,8 +3,10 @@ r"""Everything that happened between two neighbouring points: what the integers 
 A value that leaves and returns within a step, two folds within a step, leave all integers as they were. Where a
 parabola through three neighbours (`events.dip_of`) or the cubic of the parameter (`events.double_turn`) comes near zero
 inside the step, the test function is minimised along the curve; a point where it has crossed zero divides the segment,
-and each part is resolved by its integers. A crossing that the parabola foretold and the curve does not show makes the
-step doubtful: near a branch point the new point may lie on the other branch.
+and each part is resolved by its integers. A crossing that the parabola, or the line through the last two values,
+foretold and the curve does not show makes the step doubtful: near a branch point the new point may lie on the other
+branch. Both ends of a segment that is searched share a mesh: of a point whose mesh was adapted the segment behind it
+needs the older form (`twin`).
 """
 
 from __future__ import annotations
@@ -14,42 +16,67 @@ from itertools import pairwise
 import numpy as np
 
 from ..words import Kind
-from .events import crossed, dip_of, double_turn, supported
+from .events import crossed, dip_of, double_turn, matched_growth, supported
 from .locating import Found, Locator
 from .points import Point
 
 __all__ = ["between", "hopped"]
 
 _DIP = 0.15  # a vertex below this part of its neighbours is looked at
+_SUDDEN = 0.2  # a value that comes down to less than this part of itself in a step
 
 
-def between(locator: Locator, before: Point | None, a: Point, b: Point) -> tuple[list[Found], bool]:
-    """Events between a and b (and, seen late, between the point before and a), and whether b is doubtful."""
+def between(
+    locator: Locator, before: Point | None, a: Point, b: Point, twin: Point | None = None
+) -> tuple[list[Found], bool]:
+    """Events between a and b (and, seen late, between the point before and a), and whether b is doubtful.
+
+    `twin` is a on the mesh of the point before, where that is another one.
+    """
     here: list[Point] = [a, b]
-    behind: list[Point] = [before, a] if before is not None and before.problem is a.problem else []
+    end = a if twin is None else twin
+    behind: list[Point] = [before, end] if before is not None and before.problem is end.problem else []
+    segments = [tuple(knots) for knots in (behind, here) if knots]
     x = double_turn(a, b)
     cuts = [] if x is None else [(x, 3, 0.0)]
+    doubtful = False
     if before is not None and supported(a, b):
         for which in _tests(b):
             dip = dip_of((before, a, b), which)
             if dip is not None and dip.depth < _DIP:
                 cuts.append((dip.at, which, dip.depth))
-    doubtful = False
+        doubtful = _foretold(before, a, b) and hopped(locator, a, b)
     for x, which, depth in cuts:
-        knots = here if x > a.s else behind
-        if not knots:
+        if x <= a.s and not behind:
             continue
-        turn = _turning_point(locator, knots[0], knots[-1], which, x)
+        turn = _turning_point(locator, segments, which, x)
         if turn is not None:
+            knots = here if turn.problem is a.problem and turn.s > a.s else behind
             knots.append(turn)
             knots.sort(key=lambda q: q.s)
-        elif depth < 0 and knots is here and len(here) == 2:
+        elif depth < 0 and x > a.s and len(here) == 2:
             doubtful = True
     found: list[Found] = []
     for knots in (behind if len(behind) > 2 else [], here):
         for p, q in pairwise(knots):
             found += locator.resolve(p, q)
     return found, doubtful and not found
+
+
+def _foretold(before: Point, a: Point, b: Point) -> bool:
+    """Whether a real value that came down toward the limit should have passed it before b, or almost, and has not.
+
+    Going on as from `before` to a it changes sign before b; or it is far smaller than a step is let go (`stepping.room`).
+    A value at a fold vanishes with the parameter's rate: only their ratio tells of a branch point.
+    """
+    rates = np.abs([[before.tangent.parameter], [a.tangent.parameter], [b.tangent.parameter]])
+    if not b.step > 0 < a.step or not rates.all():
+        return False
+    growth = matched_growth((before, a, b), -1) / rates
+    ahead = growth[1] + (growth[1] - growth[0]) * (b.step / a.step)
+    same = (growth[0] * growth[1] > 0) & (growth[1] * growth[2] > 0)
+    passed = (ahead * growth[1] < 0) | (np.abs(growth[2]) < _SUDDEN * np.abs(growth[1]))
+    return bool((same & passed).any())
 
 
 def hopped(locator: Locator, a: Point, b: Point) -> bool:
@@ -64,36 +91,31 @@ def _tests(b: Point) -> list[int]:
     return [3, 0, -1, -2] + [1] * (b.problem.critical.minus is not None)
 
 
-def _turning_point(locator: Locator, a: Point, b: Point, which: int, x: float) -> Point | None:
-    """Minimise the test over the segment by parabolas: a point where it has crossed zero, or None."""
-    known = [a, b]
+def _turning_point(locator: Locator, segments: list[tuple[Point, ...]], which: int, x: float) -> Point | None:
+    """Minimise the test over neighbouring segments by parabolas: a point where it has crossed zero, or None."""
+    known = [segments[0][0], *(ends[1] for ends in segments)]
     for _ in range(20):
+        a, b = next((ends for ends in segments if x <= ends[1].s), segments[-1])
         new = _inside(locator, a, b, x)
         if new is None or min(abs(new.s - p.s) for p in known) < 1e-9:
             return None
         known.append(new)
         known.sort(key=lambda p: p.s)
-        here = next(k for k, p in enumerate(known) if p is new)
-        i = min(max(here, 1), len(known) - 2)
-        triple = (known[i - 1], known[i], known[i + 1])
-        if crossed((a, new, b), which) or crossed(triple, which):
+        triples = [(known[i - 1], known[i], known[i + 1]) for i in range(1, len(known) - 1)]
+        beside = [three for three in triples if any(p is new for p in three)]
+        if any(crossed(three, which) for three in [(a, new, b), *beside]):
             return new
-        dip = dip_of(triple, which)
-        if dip is None:
+        dips = [(dip, three) for three in triples if (dip := dip_of(three, which)) is not None]
+        if not dips:
             return None
-        low = int(np.argmin(np.abs(dip.values)))
-        if low != 1 and 0 < i - 1 + low < len(known) - 1:  # the lowest point so far becomes the middle one
-            i += low - 1
-            triple = (known[i - 1], known[i], known[i + 1])
-            dip = dip_of(triple, which)
-            if dip is None:
-                return None
-        lowest, x = triple[1], dip.at
-        if abs(x - lowest.s) < 0.1 * dip.width:
-            if triple[2].s - triple[0].s < 8 * dip.width:
+        dip, three = min(dips, key=lambda pair: pair[0].depth)
+        x = dip.at
+        nearest = min(known, key=lambda p: abs(p.s - x))
+        if abs(x - nearest.s) < 0.1 * dip.width:
+            if three[2].s - three[0].s < 8 * dip.width:
                 return None  # the minimum is sampled closely, and it is not zero
-            side = 1 if triple[2].s - lowest.s > lowest.s - triple[0].s else -1
-            x = lowest.s + side * 2 * dip.width
+            side = 1 if three[2].s - nearest.s > nearest.s - three[0].s else -1
+            x = nearest.s + side * 2 * dip.width
     return None
 
 

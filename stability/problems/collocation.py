@@ -35,7 +35,7 @@ from .collocation_error import multiplier_error, node_error
 from .collocation_linearisation import CollocationLinearisation, Workspace
 from .orbit_adaption import adapted
 from .orbit_mesh import OrbitMesh
-from .orbit_spectrum import contracted, deflated, eigenvalues, orbit_spectrum
+from .orbit_spectrum import contracted, deflated, eigenvalues, liouville_gap, orbit_spectrum
 from .orbit_starts import doubled_problem
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
 
@@ -352,7 +352,10 @@ class Collocation(OrbitDiscretisation):
         return node_error(self, u, params)
 
     def spectrum(self, linearisation: Any) -> Spectrum:
-        """Multipliers, their error (by degree m + 1, and the trivial multiplier's distance from 1), counts, verdict."""
+        """Multipliers, their error, counts, verdict.
+
+        The error is that by degree m + 1, the trivial multiplier's distance from 1, and Liouville's gap together.
+        """
         M, error = linearisation.spectral, 0.0
         if not np.isfinite(M).all():
             return orbit_spectrum(np.full(self.mesh.n - self.mesh.own, np.nan, complex), np.inf)
@@ -363,7 +366,19 @@ class Collocation(OrbitDiscretisation):
         error += multiplier_error(self, linearisation, values, direction if self.mesh.own else None)
         error += 1e-15 * float(np.abs(M).max()) * len(M)
         values = contracted(values, linearisation.work.M) if not self.halved else values
+        error += liouville_gap(values, self._growth_of_volume(linearisation), self.orientation)
         return orbit_spectrum(values, error, self._area_preserving(linearisation))
+
+    def _growth_of_volume(self, linearisation: CollocationLinearisation) -> float:
+        """int tr J dt over the span of the mesh, by the mesh's own Gauss quadrature."""
+        J, n = linearisation.work.J, self.mesh.n
+        trace = J.reshape(len(J), n * n)[:, :: n + 1].sum(axis=1)
+        return linearisation.sigma * float(self.mesh.weights @ trace)
+
+    @cached_property
+    def orientation(self) -> float:
+        """Sign of det S."""
+        return math.copysign(1.0, float(np.linalg.det(self.closure)))
 
     def _area_preserving(self, linearisation: CollocationLinearisation) -> bool:
         """Whether a forced system of two states has no divergence, hence det M = 1."""

@@ -64,6 +64,11 @@ class OrbitMesh:
         return np.ascontiguousarray(np.mod(self.span * self.points.ravel(), 1.0))
 
     @cached_property
+    def weights(self) -> Array:
+        """(N m,) of the quadrature over s at the Gauss points."""
+        return np.ascontiguousarray((self.h[:, None] * self.rule.weights).ravel())
+
+    @cached_property
     def size(self) -> int:
         """Length of u."""
         return self._parts[1] + self.own

@@ -9,6 +9,10 @@ vector is f / |f|,
 
 and |M f - f| / |f| is a measured error. A multiplier closer to the unit circle than the error is not counted as
 outside, and a verdict that depends on it is UNDETERMINED.
+
+Liouville's formula is a second witness at every point: the product of all multipliers is exp(int_0^T tr J dt). What the
+product misses becomes part of the error (`liouville_gap`), so that a Jacobian that is not the field's own, a mesh too
+coarse or a product of matrices that has lost its digits leaves no verdict standing that it could have turned.
 """
 
 from __future__ import annotations
@@ -22,9 +26,10 @@ from ..kernels.periodic_schur import product_eigenvalues
 from ..protocols import Spectrum
 from ..words import Verdict
 
-__all__ = ["contracted", "deflated", "eigenvalues", "orbit_spectrum", "spectrum_distance"]
+__all__ = ["contracted", "deflated", "eigenvalues", "liouville_gap", "orbit_spectrum", "spectrum_distance"]
 
 Array = np.ndarray
+_FAINT = 1e-3  # multipliers below this part of the largest may be wrong by much and leave the others right
 
 
 def eigenvalues(matrix: Array) -> Array:
@@ -76,6 +81,33 @@ def contracted(values: Array, factors: Array) -> Array:
     out = values.copy()
     out[len(values) - int(small.sum()) :] = exact[len(exact) - int(small.sum()) :]
     return out
+
+
+def liouville_gap(values: Array, integral: float, sign: float = 1.0) -> float:
+    """Error of the multipliers near the unit circle that Liouville's formula asks for.
+
+    An error e of one multiplier changes the product by e times the others, so that
+
+        gap = |prod mu - sign exp(integral)| / prod max(|mu|, r),     r = 1e-3 max(1, largest |mu|),
+
+    integral = int_0^T tr J dt. The floor r keeps strongly contracted multipliers, whose own relative error is no
+    concern of the others, from being taken for an error of those. (The trivial multiplier 1 may be left out.)
+
+    >>> liouville_gap(np.array([0.8 + 0.4j, 0.8 - 0.4j]), math.log(0.8)) < 1e-15
+    True
+    >>> round(liouville_gap(np.array([0.9 + 0j, 0.8 + 0j]), math.log(0.738)), 3)
+    0.025
+    """
+    product, others = 1.0 + 0.0j, 1.0
+    listed = values.tolist()
+    least = _FAINT * max(1.0, max(map(abs, listed), default=0.0))
+    for value in listed:
+        product *= value
+        others *= max(abs(value), least)
+    if not math.isfinite(others):
+        return 0.0  # the product means nothing; the values say so themselves
+    expected = sign * math.exp(min(integral, 700.0))
+    return abs(product.real - expected) / others
 
 
 def orbit_spectrum(values: Array, error: float, neutral: bool = False) -> Spectrum:

@@ -6,6 +6,8 @@ branch is followed. Places are random, a third of them within 3e-4 .. 0.1 of ano
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from planted_equilibria import followed, random_case
@@ -26,10 +28,10 @@ def outcome(seed: int, scales: float = 0.0) -> tuple[bool, int, float]:
     return True, spare, max(abs(g - e) for (_, g), (_, e) in zip(got, case.expected)) / width
 
 
-def check(seeds: range, scales: float = 0.0, missing: float = 0.0) -> None:
+def check(seeds: Sequence[int], scales: float = 0.0) -> None:
     results = [outcome(seed, scales) for seed in seeds]
     wrong = [seed for seed, (right, _, error) in zip(seeds, results) if not right or error > 1e-8]
-    assert len(wrong) <= missing * len(seeds), wrong
+    assert not wrong
     assert sum(spare for _, spare, _ in results) <= 1e-3 * len(seeds)
 
 
@@ -46,8 +48,13 @@ def test_variables_of_1e_minus_9_to_1e9(first: int) -> None:
 
 @pytest.mark.slow
 def test_three_thousand() -> None:
-    """Missed: below one case in five hundred (crossing curves nearer to each other than a step is long)."""
-    check(range(3000), missing=2e-3)
+    check(range(3000))
+
+
+def test_pairs_between_two_points_of_the_branch() -> None:
+    """705: the other curve of a transcritical pair runs 1e-4 away, where a step hops; 1829: two values near zero at
+    once; 2036: the mesh changes between the two steps that show the dip."""
+    check((705, 1829, 2036))
 
 
 def test_same_points_in_either_direction() -> None:

@@ -1,0 +1,66 @@
+"""Liouville's formula as a witness at every point: the product of the multipliers is exp(int tr J dt).
+
+Witness: the constant divergence -2 xi of the Duffing oscillator, for which the integral is known without quadrature;
+a monodromy matrix that is damaged on purpose must cost the verdict that the damage could have turned.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import stability as st
+from stability.problems.orbit_spectrum import liouville_gap
+
+
+def solved(**params: float):
+    problem = st.Collocation(st.models.duffing(xi=1e-4, beta=0.001, **params))
+    p = problem.system.parameter_vector()
+    return problem, problem.linearise(problem.start(p), p)
+
+
+def test_volume_by_quadrature_is_that_of_a_constant_divergence():
+    problem, L = solved(Omega=0.5)
+    assert problem._growth_of_volume(L) == pytest.approx(-2 * 1e-4 * 2 * np.pi / 0.5, rel=1e-13)
+    assert liouville_gap(problem.spectrum(L).values, problem._growth_of_volume(L)) < 1e-11
+
+
+@pytest.mark.parametrize("damage", [3e-3, 1e-2])
+def test_a_damaged_monodromy_matrix_loses_its_verdict(damage):
+    """Multipliers of modulus 0.9987: true by their own error; with one interval's map wrong by 1 % they may be outside."""
+    problem, L = solved(Omega=0.5)
+    sound = problem.spectrum(L)
+    assert sound.verdict is st.Verdict.STABLE and sound.error < 1e-9
+    L.work.M[7] *= 1 - damage
+    broken = problem.spectrum(dataclasses.replace(L))
+    assert np.abs(broken.values).max() < np.abs(sound.values).max()
+    assert broken.error > damage and broken.verdict is st.Verdict.UNDETERMINED
+
+
+def test_contracted_multipliers_are_not_mistaken_for_others():
+    """A multiplier 1e-9 that is wrong by a factor of 100 says nothing about one of 0.999; one of 0.1 does."""
+    assert liouville_gap(np.array([0.999, 1e-7], complex), np.log(0.999e-9)) < 2e-4
+    assert liouville_gap(np.array([0.999, 0.11], complex), np.log(0.0999)) == pytest.approx(0.1, rel=0.1)
+    assert liouville_gap(np.array([np.inf, 0.1], complex), 0.0) == 0.0
+
+
+def test_errors_on_a_branch_contain_the_gap():
+    """The error of every point of the textbook oscillator's branch is at least what Liouville's formula measures."""
+    branch = st.continuation(st.Collocation(st.models.duffing_textbook(delta=0.1, gamma=25.0)), "omega", (3.0, 1.5))
+    exact = np.exp(-0.1 * 2 * np.pi / branch.parameter)
+    floor = 1e-3 * np.maximum(1, np.abs(branch.values[:, :1]))
+    missed = np.abs(np.prod(branch.values, axis=1).real - exact)
+    assert (missed / np.prod(np.maximum(np.abs(branch.values), floor), axis=1) <= branch.value_errors + 1e-15).all()
+    assert branch.value_errors.max() < 1e-5
+
+
+def test_halved_orbits_keep_the_orientation_of_their_symmetry():
+    """N = S^-1 Phi of the half period with S = -1 on two states: det S = +1; a reflection of one state: -1."""
+    even = st.Collocation(st.models.duffing(), symmetry=-np.eye(2))
+    odd = st.Collocation(st.models.duffing(), symmetry=np.diag([1.0, -1.0]))
+    assert (even.orientation, odd.orientation) == (1.0, -1.0)
+    p = even.system.parameter_vector()
+    L = even.linearise(even.start(p), p)
+    assert liouville_gap(even.spectrum(L).values, even._growth_of_volume(L), even.orientation) < 1e-10
