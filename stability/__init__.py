@@ -56,6 +56,7 @@ _EXPORTS: dict[str, str] = {
     "sweep": "simulation.sweeping",
     "Sweep": "results.sweep",
     "Status": "words",
+    "Symmetry": "systems.symmetries",
     "System": "systems.system",
     "Table": "systems.tables",
     "Verdict": "words",

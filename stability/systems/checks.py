@@ -97,6 +97,14 @@ def _infinities() -> tuple[Any, ...]:
     return sp.oo, -sp.oo, sp.zoo, sp.nan
 
 
+def _symmetries(given: Any, states: tuple[str, ...]) -> tuple[Any, ...]:
+    from .symmetries import Symmetry
+
+    declared = (given,) if isinstance(given, (Mapping, Symmetry)) else tuple(given)
+    whole = [(s if isinstance(s, Symmetry) else Symmetry(s)).completed(states) for s in declared]
+    return tuple(Symmetry(s.images, s.shift) for s in whole)
+
+
 def checked_fields(system: System) -> dict[str, Any]:
     """The fields of a new system, validated and in canonical types; raises before anything is computed."""
     states, coordinates = tuple(system.states), tuple(system.coordinates)
@@ -140,4 +148,5 @@ def checked_fields(system: System) -> dict[str, Any]:
         "states": states, "coordinates": coordinates, "parameters": parameters, "bounds": _intervals(system),
         "angles": tuple(system.angles), "stops": tuple(system.stops),
         "breaks": tuple(system.breaks),
+        "declared_symmetries": _symmetries(system.declared_symmetries, states),
     }  # fmt: skip

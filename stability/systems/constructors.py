@@ -35,6 +35,7 @@ class Constructors:
         orders: Mapping[str, int] | None = None,
         base: BaseMotion | None = None,
         stops: Iterable[Any] = (),
+        symmetries: Iterable[Any] = (),
         description: str = "",
     ) -> Self:
         """A system from equations of motion of first or second order, solved through their mass matrix.
@@ -52,6 +53,8 @@ class Constructors:
             Of the forcing, in the parameters. Found by itself where time occurs only in sines and cosines.
         name, outputs, units, bounds, breaks, angles, orders, base, stops, description
             As in `System`; expressions may use the coordinates and their derivatives.
+        symmetries : sequence of Symmetry
+            Declared ones, verified now; the usual ones are found without (`System.symmetries`).
 
         Returns
         -------
@@ -74,7 +77,7 @@ class Constructors:
 
         common: dict[str, Any] = {
             "name": name, "angles": angles, "orders": orders, "base": base, "stops": stops,
-            "description": description, "units": units, "bounds": bounds,
+            "description": description, "units": units, "bounds": bounds, "declared_symmetries": symmetries,
         }  # fmt: skip
         return cls(**system_fields(equations, coordinates, parameters, period, outputs, breaks, **common))
 
@@ -97,6 +100,7 @@ class Constructors:
         orders: Mapping[str, int] | None = None,
         base: BaseMotion | None = None,
         stops: Iterable[Any] = (),
+        symmetries: Iterable[Any] = (),
         description: str = "",
     ) -> Self:
         """A system from its Lagrangian L = T - U, Rayleigh function R and external forces Q.
@@ -115,7 +119,7 @@ class Constructors:
             The Rayleigh function R (half the dissipated power for viscous damping).
         forces : mapping
             Coordinate -> external generalised force Q.
-        parameters, period, name, outputs, units, bounds, breaks, angles, orders, base, stops, description
+        parameters, period, name, outputs, units, bounds, breaks, angles, orders, base, stops, symmetries, description
             As in `from_equations`.
 
         Returns
@@ -140,7 +144,8 @@ class Constructors:
         equations = equations_of_motion(lagrangian, coordinates, dissipation=dissipation, forces=forces)
         return cls.from_equations(
             equations, coordinates, parameters=parameters, period=period, name=name, outputs=outputs, units=units,
-            bounds=bounds, breaks=breaks, angles=angles, orders=orders, base=base, stops=stops, description=description,
+            bounds=bounds, breaks=breaks, angles=angles, orders=orders, base=base, stops=stops,
+            symmetries=symmetries, description=description,
         )  # fmt: skip
 
     @classmethod
@@ -156,6 +161,7 @@ class Constructors:
         angles: Iterable[str] = (),
         bounds: Mapping[str, tuple[float, float]] | None = None,
         units: Mapping[str, str] | None = None,
+        symmetries: Iterable[Any] = (),
         description: str = "",
     ) -> Self:
         """A system around a numpy-broadcasting Python function ``f(t, x, *, <parameters>)`` -> dx/dt.
@@ -176,6 +182,8 @@ class Constructors:
             Defaults for keyword-only arguments that have none, or to replace those they have.
         name, breaks, angles, bounds, units, description
             As in `System`.
+        symmetries : sequence of Symmetry
+            Declared ones, verified at random points now: such a system cannot prove those that it has.
 
         Returns
         -------
@@ -198,6 +206,7 @@ class Constructors:
 
         common: dict[str, Any] = {
             "angles": angles, "bounds": bounds, "units": units, "description": description, "breaks": breaks,
+            "declared_symmetries": symmetries,
         }  # fmt: skip
         return cls(**function_fields(function, states, period, parameters, name, **common))
 

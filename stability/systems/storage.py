@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import FileFormatError, InputError
 from .excitation import BaseMotion
 from .stops import HardStop
+from .symmetries import Symmetry
 from .tree import from_tree, to_tree
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def to_plain(system: System, schema: str) -> dict[str, Any]:
     if system.function is not None or system.rhs is None:
         raise InputError(f"'{system.name}' is built around a Python function, which is not data and cannot be written")
     period = system.period_expression
+    declared = system.declared_symmetries
     slow = {k: to_tree(e) for k, e in system.reconstruction.items()}
     return {
         "schema": schema,
@@ -43,6 +45,7 @@ def to_plain(system: System, schema: str) -> dict[str, Any]:
         "base": None if system.base is None else [system.base.parameter, to_tree(system.base.angular_frequency)],
         "description": system.description,
         **({"reconstruction": [[k, e] for k, e in slow.items()]} if slow else {}),
+        **({"symmetries": [[dict(s.images), s.shift] for s in declared]} if declared else {}),
     }
 
 
@@ -67,6 +70,7 @@ def from_plain(data: Mapping[str, Any]) -> dict[str, Any]:
             "base": None if base is None else BaseMotion(str(base[0]), from_tree(base[1])),
             "description": str(data["description"]),
             "reconstruction": {str(k): from_tree(e) for k, e in data.get("reconstruction", ())},
+            "declared_symmetries": tuple(Symmetry(dict(s), float(h)) for s, h in data.get("symmetries", ())),
         }
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, FileFormatError):

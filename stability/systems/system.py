@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     import sympy as sp
 
     from .excitation import BaseMotion, Excitation
+    from .symmetries import Symmetry
 
 __all__ = ["System"]
 
@@ -83,6 +84,8 @@ class System(Constructors):
         One sentence.
     function : callable or None
         ``f(t, x, *, <parameters>)`` of a system around a Python function.
+    declared_symmetries : tuple of Symmetry, or of mappings ``{"u": "-u"}``
+        Symmetries to be verified now, beside those that `symmetries` finds by itself.
 
     Raises
     ------
@@ -116,6 +119,7 @@ class System(Constructors):
     base: BaseMotion | None = None
     description: str = ""
     function: Callable[..., Any] | None = None
+    declared_symmetries: tuple[Any, ...] = ()
     _hash: str = field(default="", init=False)
 
     def __post_init__(self) -> None:
@@ -126,6 +130,10 @@ class System(Constructors):
         for key, value in checked_fields(self).items():
             object.__setattr__(self, key, _frozen(value) if isinstance(value, Mapping) else value)
         object.__setattr__(self, "_hash", self._digest())
+        if self.declared_symmetries:
+            from .symmetries import verified
+
+            object.__setattr__(self, "declared_symmetries", tuple(verified(self, s) for s in self.declared_symmetries))
 
     # ------------------------------------------------------------------ reading
     @property
@@ -139,6 +147,19 @@ class System(Constructors):
         if self.period_expression is None:
             return None
         return self.period_at(**dict(self.parameters))
+
+    @property
+    def symmetries(self) -> tuple[Symmetry, ...]:
+        """Space-time symmetries f(t + shift T, S x, p) = S f(t, x, p): the declared ones, then those that were found.
+
+        >>> import stability as st
+        >>> st.models.autoparametric_pendulum().symmetries
+        (theta -> -theta,)
+        """
+        from .symmetry_search import find_symmetries
+
+        own = {(s.images, s.shift) for s in self.declared_symmetries}
+        return (*self.declared_symmetries, *(s for s in find_symmetries(self) if (s.images, s.shift) not in own))
 
     def period_at(self, **params: float) -> float:
         """The forcing period at the given parameters (others at their defaults)."""
