@@ -10,7 +10,7 @@ starts at v) and one backward sweep (omega, from w): the stage residual is R = W
 
     dg = sum h omega^T d( sigma f_z (V, lambda) + (span tau + sigma_lambda lambda) f ),
 
-which needs second directional derivatives f_zz[(V, lambda), e_k] only, all k in one batched call.
+which needs the gradient of omega^T f_z (V, lambda) over z at the stages only (`Evaluator.second_gradient`).
 """
 
 from __future__ import annotations
@@ -288,7 +288,10 @@ class CollocationLinearisation:
         V = V.reshape(count, n)
         direction = np.zeros((count, n + m))
         direction[:, :n], direction[:, n + free] = V, amount
-        second = np.einsum("kcn,cn->ck", self._second(direction), weighted)  # (count, n + m)
+        states = np.ascontiguousarray(mesh.split(self.u)[1].reshape(count, n))
+        # sizes of the variables, so that second derivatives by differences are well scaled
+        sizes = np.concatenate([D, np.maximum(np.abs(self.params), 1e-3)])
+        second = problem.evaluations.second_gradient(mesh.phase, states, self.params, direction, weighted, sizes)
         along = np.einsum("cij,cj->ci", J, V) + amount * work.Fp[:, :, free]
         stretch = mesh.span * (tau + work.dT[free] * amount)
         g_state = sigma * second[:, :n] + stretch * np.einsum("cij,ci->cj", J, weighted)
@@ -302,19 +305,3 @@ class CollocationLinearisation:
             # tau = T v_n: the core unknown is relative, so that T itself appears once more
             rest += float(v[n]) * mesh.span * (work.F * weighted).sum()
         return mesh.join(np.zeros((N + 1, n)), g_state, rest), g_params
-
-    def _second(self, direction: Array) -> Array:
-        """f_zz[direction, e_k] for all k: (n + m, count, n), one batched call; units of the variables' size."""
-        mesh, problem = self.mesh, self.problem
-        count, width = direction.shape
-        states = np.ascontiguousarray(mesh.split(self.u)[1].reshape(count, mesh.n))
-        sizes = np.concatenate([problem.scales, np.maximum(np.abs(self.params), 1e-3)])
-        length = np.abs(direction / sizes).max()
-        if length == 0:
-            return np.zeros((width, count, mesh.n))
-        units = np.repeat(np.diag(sizes), count, axis=0)
-        values = problem.evaluations.second(
-            np.tile(mesh.phase, width), np.tile(states, (width, 1)), self.params,
-            np.tile(direction / length, (width, 1)), units
-        )
-        return np.asarray(values.reshape(width, count, mesh.n) * (length / sizes)[:, None, None])

@@ -114,21 +114,15 @@ class DenseLinearisation:
         n, m = self.F.size, self.params.size
         s = self.problem.scales
         z = np.concatenate([v * s, v_params])
-        # unit directions of the size of the variables, so that difference-based second derivatives are well scaled
+        # sizes of the variables, so that second derivatives by differences are well scaled
         sizes = np.concatenate([s, np.maximum(np.abs(self.params), 1e-3)])
-        W = np.diag(sizes)
-        parts = [z.real, z.imag] if np.iscomplexobj(z) and np.any(z.imag) else [z.real]
-        D = 0
-        for k, part in enumerate(parts):
-            length = np.max(np.abs(part) / sizes)
-            if length == 0:
-                continue
-            V = np.broadcast_to(part / length, (n + m, n + m))
-            second = self.problem.evaluations.second(
-                np.zeros(n + m), np.tile(self.u, (n + m, 1)), self.params, np.ascontiguousarray(V), W
-            )
-            D = D + (1j if k else 1.0) * length * second
-        gradient = (np.asarray(D) / sizes[:, None]) @ (w / s) if np.ndim(D) else np.zeros(n + m)
+        weights, phase, X = w / s, np.zeros(1), self.u[None, :]
+        gradient: NDArray[Any] = np.zeros(n + m)
+        for factor, part in ((1.0, z.real), (1j, z.imag)):
+            for turn, weight in ((1.0, np.real(weights)), (1j, np.imag(weights))):
+                if np.any(part) and np.any(weight):
+                    slope = self.problem.evaluations.second_gradient(phase, X, self.params, part, weight, sizes)[0]
+                    gradient = gradient + factor * turn * slope
         return gradient[:n], gradient[n:]
 
     def embed(self, w: NDArray[Any]) -> NDArray[Any]:

@@ -106,6 +106,27 @@ class Evaluator:
         """Third directional derivative D3F[U, V, W] over z = (x, p) at fixed phase; result (N, n)."""
         return self._directional("third", phase, X, P, (U, V, W))
 
+    def second_gradient(self, phase: Any, X: Any, P: Any, V: Any, W: Any, sizes: Any) -> Array:
+        """sum_i W_i D2F_i[V, e_k] for every k of z = (x, p): gradient of W . D_V F at fixed V (N, n+m), W (N, n).
+
+        `sizes` (n+m,) of the variables scale the differences of back ends without formulas. Result (N, n+m).
+        """
+        sizes = np.asarray(sizes, dtype=float)
+        N, width = len(X), self.n + self.m
+        V, W = np.broadcast_to(V, (N, width)), np.broadcast_to(W, (N, self.n))
+        length = float(np.abs(V / sizes).max(initial=0.0))
+        if length == 0.0:
+            return np.zeros((N, width))
+        units = np.repeat(np.diag(sizes), N, axis=0)
+        times = None if phase is None else np.tile(np.broadcast_to(phase, (N,)), width)
+        P = np.asarray(P, dtype=float)
+        values = self.second(
+            times, np.tile(X, (width, 1)), P if P.ndim == 1 else np.tile(P, (width, 1)),
+            np.tile(V / length, (width, 1)), units,
+        )  # fmt: skip
+        slopes: Array = np.einsum("kcn,cn->ck", values.reshape(width, N, self.n), W) * (length / sizes)
+        return slopes
+
     def _directional(self, which: str, phase: Any, X: Any, P: Any, directions: Sequence[Any]) -> Array:
         phase, X, P = self._checked(phase, X, P)
         shape = (len(X), self.n + self.m)

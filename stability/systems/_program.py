@@ -94,6 +94,11 @@ class Equations:
     def _shared(self) -> tuple[list[Assignment], list[sp.Expr]]:
         return share(self.rhs)
 
+    @property
+    def _along_and_weights(self) -> tuple[tuple[sp.Symbol, ...], tuple[sp.Symbol, ...]]:
+        """A direction over z and weights over the equations: the inputs of "second_gradient"."""
+        return symbols("v_", len(self.variables)), symbols("w_", len(self.rhs))
+
     def _program(
         self,
         assignments: Iterable[Assignment],
@@ -104,7 +109,7 @@ class Equations:
         return Program(self.phase, self.states, self.parameters, directions, tuple(assignments), blocks)
 
     def program(self, which: str) -> Program:
-        """The program of "F", "FJ", "FJP", "outputs", "period", "second" or "third"."""
+        """The program of "F", "FJ", "FJP", "outputs", "period", "second", "third" or "second_gradient"."""
         if which == "period":
             return self.expanded(which)
         assignments, rhs = self._shared
@@ -119,6 +124,12 @@ class Equations:
             if which == "FJP":
                 blocks.append([row.get(z, sp.S.Zero) for row in rows for z in self.parameters])
             return self._program(assignments, rhs, *blocks)
+        if which == "second_gradient":
+            v, w = self._along_and_weights
+            assignments, rhs = tangent(assignments, rhs, dict(zip(self.variables, v, strict=True)))
+            total = sp.Add(*(a * e for a, e in zip(w, rhs, strict=True)))
+            rows, assignments = gradients(assignments, [total], self.variables)
+            return self._program(assignments, [rows[0].get(z, sp.S.Zero) for z in self.variables], directions=(v, w))
         directions = tuple(symbols(f"{letter}_", len(self.variables)) for letter in ("v", "w", "u")[: ORDERS[which]])
         for block in directions:
             assignments, rhs = tangent(assignments, rhs, dict(zip(self.variables, block, strict=True)))
@@ -137,6 +148,11 @@ class Equations:
             if which == "FJP":
                 blocks.append([differentiate(e, z) for e in self.rhs for z in self.parameters])
             return self._program((), self.rhs, *blocks)
+        if which == "second_gradient":
+            v, w = self._along_and_weights
+            slopes = (a * b * differentiate(e, z) for a, e in zip(w, self.rhs) for b, z in zip(v, self.variables))
+            total = sp.Add(*slopes)
+            return self._program((), [differentiate(total, z) for z in self.variables], directions=(v, w))
         directions = tuple(symbols(f"{letter}_", len(self.variables)) for letter in ("v", "w", "u")[: ORDERS[which]])
         results = list(self.rhs)
         for block in directions:

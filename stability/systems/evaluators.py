@@ -31,6 +31,20 @@ class ExpressionEvaluator(Evaluator):
         super().__init__(system)
         self._equations = equations
 
+    def second_gradient(self, phase: Any, X: Any, P: Any, V: Any, W: Any, sizes: Any) -> Array:
+        """As in the contract, by its own program: one evaluation for all k."""
+        phase, X, P = self._checked(phase, X, P)
+        N = len(X)
+        blocks = []
+        for given, width in ((V, self.n + self.m), (W, self.n)):
+            block = np.asarray(given, dtype=float)
+            if block.shape not in ((N, width), (width,)):
+                raise InputError(f"a direction has shape {(N, width)} or {(width,)}; got {block.shape}")
+            blocks.append(np.ascontiguousarray(np.broadcast_to(block, (N, width))))
+        out = np.empty((N, self.n + self.m))
+        self._run("second_gradient", phase, X, P, tuple(blocks), (out,))
+        return out
+
     def _break_values(self, P: Array) -> Array:
         if not self._equations.breaks:
             return np.empty(0)
