@@ -1,20 +1,27 @@
 """Errors of a collocation solution, measured by one Newton step at degree m + 1 from the same orbit.
 
 The step changes the nodes by their error at degree m, up to higher order, and likewise the period and the multipliers.
-Along a branch it is taken with the arclength condition of the point; for a solution alone, at fixed parameters, unless
-the solution lies close to a fold: there the step is bordered by the null direction, and the parameter that unfolds the
-singularity most is free. The step costs about as much as an iteration of the solve, so the error of multipliers that
-are far from the unit circle is carried over from an earlier point of the same mesh.
+Along a branch it is taken with the arclength condition of the point; for a solution alone, at fixed parameters. Where a
+multiplier is 1, at folds and branch points, the linear system of that step is singular and the step would run along the
+branch, or over to the other one: there it is bordered by the null vectors v of F_u and w of F_u^T,
+
+    [ F_u   w ] [ change ]   [ -F ]
+    [ v^T   0 ] [   mu   ] = [  0 ],
+
+so that the solution keeps its place along v, and what of F only a change of the parameter could mend (mu) is left: it
+moves the special point, not the orbit. The step costs about as much as an iteration of the solve, so the error of
+multipliers that are far from the unit circle is carried over from an earlier point of the same mesh.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..protocols import Corrected, Tangent
+from ..protocols import Tangent
 from .orbit_spectrum import deflated, eigenvalues, spectrum_distance
 
 if TYPE_CHECKING:
@@ -24,6 +31,8 @@ if TYPE_CHECKING:
 __all__ = ["multiplier_error", "node_error", "refined"]
 
 Array = np.ndarray
+_SINGULAR = 1e-4  # distance of a multiplier from 1 below which a step at a fixed parameter means nothing
+_HIGHEST = 11
 
 
 def _same(a: Array, b: Array) -> bool:
@@ -47,40 +56,48 @@ def refined(problem: Collocation, u: Array, params: Array) -> tuple[Array, Array
         t_nodes, t_stages, t_rest = mesh.split(t.u)
         t_stages = mesh.resample(higher, t_nodes, t_stages)
         tangent = Tangent(higher.join(t_nodes, t_stages, t_rest), t.parameter, t.weight)
-    found = problem.newton(higher, start, params, index, tangent, 0.0, np.inf, 1)
-    if tangent is None and not _is_small(problem, found, nodes):
-        # close to a fold the step at a fixed parameter runs along the branch: hold the solution's place there
-        index, null = _along_branch(problem, u, params)
-        t_nodes, t_stages, t_rest = mesh.split(null)
-        t_stages = mesh.resample(higher, t_nodes, t_stages)
-        border = Tangent(higher.join(t_nodes, t_stages, t_rest), 0.0, 1.0)
-        other = problem.newton(higher, start, params, index, border, 0.0, np.inf, 1)
-        found = other if _is_small(problem, other, nodes) else found
     result: Any = None
-    if found.converged:
-        change = higher.split(found.u)[0] - nodes
-        result = (change, found.u, found.linearisation)
+    if tangent is None and _is_singular(problem, u, params):
+        result = _held_step(problem, u, params)
+    else:
+        found = problem.newton(higher, start, params, index, tangent, 0.0, np.inf, 1)
+        if found.converged:
+            result = (higher.split(found.u)[0] - nodes, found.u, found.linearisation)
     problem._memo["refined"] = (u, params, result)
     return result
 
 
-def _is_small(problem: Collocation, found: Corrected, nodes: Array) -> bool:
-    """Whether the step of `refined` is what a discretisation error can be."""
-    change = problem.mesh.raised.split(found.u)[0] - nodes
-    return found.converged and bool(np.abs(change / problem.scales).max() < 1e-4)
-
-
-def _along_branch(problem: Collocation, u: Array, params: Array) -> tuple[int, Array]:
-    """The parameter that unfolds a nearly singular core most, and its null direction as a unit vector in u."""
+def _is_singular(problem: Collocation, u: Array, params: Array) -> bool:
+    """Whether a multiplier besides the trivial one is 1, nearly."""
     L = problem.linearise(u, params)
-    if L.sign == 0.0:
-        return 0, np.zeros(problem.size)
+    M = L.spectral
+    if L.sign == 0.0 or not np.isfinite(M).all():
+        return False
+    if problem.mesh.own:
+        direction = problem._direction_of_flow(L)
+        if not direction.any():  # an orbit at its birth stands still
+            return False
+        M = deflated(M, direction)[0]
+    return bool(np.abs(eigenvalues(M) - 1).min(initial=1.0) < _SINGULAR)
+
+
+def _held_step(problem: Collocation, u: Array, params: Array) -> tuple[Array, Array, Workspace] | None:
+    """The bordered step of the module's head (at degree 10 for the highest degree, 11: it bounds the error then)."""
+    degree = problem.degree + 1 if problem.degree < _HIGHEST else _HIGHEST - 1
+    other = dataclasses.replace(problem, degree=degree, _memo={})
+    nodes, stages, rest = problem.mesh.split(u)
+    start = other.mesh.join(nodes, problem.mesh.resample(other.mesh, nodes, stages), rest)
+    L = other.linearise(start, params)
+    if L.sign == 0.0 or not np.isfinite(L.core).all():
+        return None
     left, _, right = np.linalg.svd(L.core)
     null = L.lift(right[-1])
-    columns = [abs(float(left[:, -1] @ L.core_column(name))) for name in problem.parameters]
-    sizes = np.maximum(np.abs(params), 1e-3)
-    length = math.sqrt(float(problem.weights @ null**2))
-    return int(np.argmax(np.array(columns) * sizes)), null / max(length, 1e-300)
+    row = other.weights * null / max(math.sqrt(float(other.weights @ null**2)), 1e-300)
+    right_side = -np.append(L.residual, 0.0)[:, None]
+    x = L.solve(row[None], L.embed(left[:, -1])[:, None], np.zeros((1, 1)), right_side)[:-1, 0]
+    if not np.isfinite(x).all():
+        return None
+    return other.mesh.split(x)[0].copy(), start + x, L.work
 
 
 def node_error(problem: Collocation, u: Array, params: Array) -> float:
