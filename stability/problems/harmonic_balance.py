@@ -153,6 +153,11 @@ class HarmonicBalance(OrbitDiscretisation):
         return self.subharmonic
 
     @cached_property
+    def own(self) -> int:  # type: ignore[override]
+        """1 where the period is an unknown."""
+        return 0 if self.flow.forced else 1
+
+    @cached_property
     def size(self) -> int:  # type: ignore[override]
         """Length of u: coefficients (2H + 1, q), and the period of an autonomous orbit."""
         return self.layout.count * self.layout.q + self.own

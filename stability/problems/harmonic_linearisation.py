@@ -61,6 +61,7 @@ class HarmonicLinearisation:
         self.problem, self.u, self.params = problem, u, params
         self.reference, self.factors, self.index = reference, factors, index
         self.c = u[: layout.count * layout.q].reshape(layout.count, layout.q)
+        self.filled = work.filled
         self.X, self.F, self.J, self.Fp, self.period_slopes = work.filled[:5]
         self.balance, self.by_omega, self.by_index, self.by_coefficients = work.filled[5:]
         self.period = period

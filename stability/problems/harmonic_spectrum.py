@@ -12,21 +12,27 @@ with the left ones (rows of their inverse) the two-sided Rayleigh quotient
 
     lambda = w^T Hill v / w^T v
 
-differs from Hill's eigenvalue by the product of both residuals. Where that bound is not below 1e-8, a Hill matrix of
-order up to 140 is solved whole and its exponents are selected (kernels/hill_matrix); the bound joins the error.
+differs from Hill's eigenvalue by the product of both residuals. Where that bound is not below 1e-8 (1e-5 where all
+multipliers are a hundred times as far from the unit circle), a Hill matrix of order up to 140 is solved whole and its
+exponents are selected (kernels/hill_matrix); the bound joins the error.
 Twice the difference between the two sets of multipliers is the error estimate: truncation of orbit and of modes both. A
 verdict that it does not support is UNDETERMINED.
 """
 
 from __future__ import annotations
 
+import cmath
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..kernels.fourier import fourier_basis, series
+from ..kernels.condensation_newton import solvers
+from ..kernels.fourier import series
 from ..kernels.gauss import gauss_rule
+from ..kernels.harmonic_stability import propagate, quotients
 from ..kernels.hill_matrix import hill_matrix, koopman_hill, mean_harmonics, selected
 from ..protocols import Spectrum
 from .harmonic_layout import slope_of
@@ -42,8 +48,11 @@ __all__ = ["HillModes", "Propagation", "checked_spectrum", "hill_modes", "indepe
 Array = np.ndarray
 _DEGREE = 5
 _BOUND = 1e-8
+_LOOSE, _SHARE = 1e-5, 1e-2  # a larger bound will do where no verdict depends on it: of multipliers' distances to the circle
 _WHOLE = 140  # order of the largest Hill matrix that is solved whole at an ordinary point
+_FARTHEST = 30.0  # of exponents times T: beyond it a quotient belongs to another mode
 _SMALL = 0.3
+_LARGEST_TRACE = 700.0  # its exponential is a number still
 _APART = 1e-2  # autonomous: nearer multipliers to 1 than this are left to the whole problem
 
 
@@ -109,72 +118,57 @@ def hill_modes(L: HarmonicLinearisation) -> HillModes:
 
 # ---------------------------------------------------------------------- monodromy along the corrected orbit
 class Propagation(NamedTuple):
-    """Phi at the starts of S equal intervals (S, n, n), Phi(T) (n, n), f at s = 0 (n,), and the defect of Liouville."""
+    """Phi at the starts of S equal intervals (S, n, n), Phi(T) (n, n), f at s = 0 (n,) of an autonomous orbit, and the
+    defect of Liouville's formula.
+    """
 
     fundamental: Array
     monodromy: Array
-    flow: Array
+    flow: Any
     defect: float
 
 
-class _Nodes(NamedTuple):
-    s: Array
-    phase: Array
-    G: Array
-    slope: Array
-    widths: Array
-    LU: Array
-    pivots: Array
-    Z: Array
-    M: Array
-    none: Array
+@lru_cache(maxsize=64)
+def _points(harmonics: int, multiple: int) -> tuple[tuple[Array, ...], Array]:
+    """(points of the collocation, phases, G and G D of K harmonics, widths) and the analysis of the intervals' starts."""
+    S = max(16, 2 * harmonics + 2)
+    s = ((np.arange(S)[:, None] + gauss_rule(_DEGREE).points) / S).ravel()
+    G = series(2 * harmonics + 1, s)
+    coarse = series(harmonics, np.arange(S) / S).T * (2.0 / S)
+    coarse[0] *= 0.5
+    return (s, np.mod(multiple * s, 1.0), G, slope_of(G), np.full(S, 1.0 / S)), np.ascontiguousarray(coarse)
 
 
-def _nodes(problem: HarmonicBalance) -> _Nodes:
+def _nodes(problem: HarmonicBalance) -> tuple[Any, ...]:
+    """(address of F and J, points with their matrices, coefficients of Gauss collocation, analysis, solver)."""
     known = problem._memo.get("nodes")
     if known is None:
-        layout = problem.layout
-        n, small, S = layout.n, layout.q, max(16, 2 * layout.harmonics + 2)
-        s = ((np.arange(S)[:, None] + gauss_rule(_DEGREE).points) / S).ravel()
-        G = series(2 * layout.harmonics + 1, s)
-        size = _DEGREE * small
-        known = problem._memo["nodes"] = _Nodes(
-            s, np.mod(problem.multiple * s, 1.0), G, slope_of(G), np.full(S, 1.0 / S), np.empty((S, size, size)),
-            np.empty((S, size), np.int64), np.empty((S, _DEGREE * n, n)), np.empty((S, n, n)),
-            np.empty((S, _DEGREE * n, 0)),
-        )  # fmt: skip
+        rule = gauss_rule(_DEGREE)
+        points, coarse = _points(problem.harmonics, problem.multiple)
+        coefficients = rule.inverse, rule.matrix, rule.row_sums, rule.update, rule.weights
+        known = problem._memo["nodes"] = (
+            problem.evaluations.address("FJ"), points, coefficients, coarse, solvers()[0]
+        )
     return known  # type: ignore[no-any-return]
 
 
 def propagated(L: HarmonicLinearisation, found: Correction) -> Propagation | None:
     """The variational equation along the corrected orbit over one period; None where it is not finite."""
-    from ..kernels.condensation import condense
-
-    problem, layout, flow = L.problem, L.problem.layout, L.problem.flow
-    nodes, rule, n = _nodes(L.problem), gauss_rule(_DEGREE), L.problem.layout.n
-    X = layout.states_by(nodes.G, nodes.slope, nodes.s, found.coefficients, 2 * np.pi / found.period)
-    if not np.isfinite(X).all():
-        return None
-    F, J = problem.evaluations.FJ(nodes.phase, X, L.params)
-    if not np.isfinite(J).all():
-        return None
-    sign = condense(
-        rule.inverse, rule.matrix, rule.row_sums, rule.update, nodes.widths, found.period, J, flow.kept, flow.position,
-        nodes.none, nodes.LU, nodes.pivots, nodes.Z, nodes.M,
+    problem, n = L.problem, L.problem.layout.n
+    address, points, coefficients, _, solver = _nodes(problem)
+    kept = problem._fixed[0][-1]
+    fundamental = np.empty((len(points[-1]) + 1, n, n))
+    trace = propagate(
+        solver, address, L.params, found.period, found.coefficients, points, coefficients, kept, problem.flow.position,
+        fundamental,
     )  # fmt: skip
-    if sign == 0.0:
+    if not abs(trace) < _LARGEST_TRACE:
         return None
-    S = len(nodes.widths)
-    fundamental = np.empty((S + 1, n, n))
-    fundamental[0] = np.eye(n)
-    for j in range(S):
-        np.dot(nodes.M[j], fundamental[j], out=fundamental[j + 1])
-    trace = np.einsum("kii->k", J).reshape(S, -1) @ rule.weights
-    growth = np.exp(found.period / S * float(trace.sum()))
-    defect = abs(float(np.linalg.det(fundamental[-1])) - growth) / max(1.0, growth)
-    rate = F[0]
+    growth = math.exp(trace)
+    defect = abs(determinant(fundamental[-1]) - growth) / max(1.0, growth)
+    rate = None
     if problem.own:
-        start = layout.states(found.coefficients, 2 * np.pi / found.period, np.zeros(1))
+        start = problem.layout.states(found.coefficients, 2 * np.pi / found.period, np.zeros(1))
         rate = problem.evaluations.F(None, start, L.params)[0]
     return Propagation(fundamental[:-1], fundamental[-1], rate, defect)
 
@@ -184,41 +178,41 @@ def _refined(L: HarmonicLinearisation, along: Propagation) -> tuple[Array, Array
 
     None where the bound is too large and Hill's matrix small enough to be solved whole, or modes are not independent.
     """
-    layout, T, omega = L.problem.layout, L.period, L.omega
+    layout, T, basis = L.problem.layout, L.period, L.problem.layout.basis
     mu, Y = _eigen(along.monodromy)
-    if not (np.abs(mu) > 1e-200).all():
+    n, listed = len(mu), mu.astype(complex).tolist()
+    if not min(map(abs, listed)) > 1e-200:
         return None
-    used = _not_trivial(mu) if L.problem.own else slice(None)
+    used = _not_trivial(mu) if L.problem.own else range(n)
     if used is None:
         return None
-    exponents = np.log(mu.astype(complex))
-    S = len(along.fundamental)
-    basis, samples = fourier_basis_of(layout.harmonics, S), layout.basis
-    shrink = np.exp(-exponents * (np.arange(S) / S)[:, None])
-    P = (along.fundamental @ Y) * shrink[:, None, :]
-    left = _inverses(P)  # (S, mode, state)
-    if left is None:
+    exponents = [cmath.log(m) for m in listed]
+    quotient, bound = np.empty(n, complex), np.empty(n)
+    if not quotients(
+        basis.synthesis, basis.analysis, _nodes(L.problem)[3], basis.k, L.J, along.fundamental,
+        np.ascontiguousarray(Y, complex), np.array(exponents), L.omega, quotient, bound,
+    ):  # fmt: skip
         return None
-    n = layout.n
-    v = (basis @ P.reshape(S, n * n)).reshape(-1, n, n)  # coefficient, state, mode
-    w = (basis @ left.reshape(S, n * n)).reshape(-1, n, n)  # coefficient, mode, state
-    values = (samples.synthesis @ v.reshape(-1, n * n)).reshape(-1, n, n)
-    applied = (samples.analysis @ (L.J @ values).reshape(-1, n * n)).reshape(-1, n, n)
-    applied[1::2] -= (omega * samples.k[1::2, None, None]) * v[2::2]
-    applied[2::2] += (omega * samples.k[2::2, None, None]) * v[1::2]
-    mean = np.where(samples.k == 0, 1.0, 0.5)[:, None, None]
-    wt = w.transpose(0, 2, 1) * mean
-    below = (wt * v).sum(axis=(0, 1))
-    quotient = (wt * applied).sum(axis=(0, 1)) / below
-    rest = np.sqrt((mean * np.abs(applied - quotient * v) ** 2).sum(axis=(0, 1)))
-    size = np.sqrt((np.abs(wt) ** 2 / mean).sum(axis=(0, 1)))
-    bound = (rest * size / np.abs(below)) * (rest / np.sqrt((mean * np.abs(v) ** 2).sum(axis=(0, 1)))) / omega
-    worst = float((bound * T * np.minimum(1.0, np.abs(mu)))[used].max(initial=0.0))
-    if not worst < (_BOUND if layout.count * n <= _WHOLE else 1e-2):
+    values, worst, margin = [], 0.0, 1.0
+    for m, exponent, at, limit in zip(listed, exponents, quotient.tolist(), bound.tolist()):
+        change = at * T - exponent
+        if not abs(change) < _FARTHEST:
+            return None
+        values.append(m * cmath.exp(change if m.imag else change.real))
+        worst = max(worst, limit * T * min(1.0, abs(m)))
+    values, listed = [values[i] for i in used], [listed[i] for i in used]
+    margin = min((abs(abs(v) - 1.0) for v in values), default=1.0)
+    if not (worst < _BOUND or (worst < _LOOSE and worst < _SHARE * margin)) and layout.count * n <= _WHOLE:
         return None
-    change = quotient * T - exponents
-    change = np.where(np.imag(mu) == 0.0, change.real, change)
-    return mu[used], (mu * np.exp(change))[used], worst
+    return (np.array(listed), np.array(values), worst) if worst < 1e-2 else None
+
+
+def determinant(M: Array) -> float:
+    """det M; 2 x 2 without LAPACK's overhead."""
+    if len(M) == 2:
+        (a, b), (c, d) = M.tolist()
+        return float(a * d - b * c)
+    return float(np.linalg.det(M))
 
 
 def _eigen(M: Array) -> tuple[Array, Array]:
@@ -230,26 +224,9 @@ def _eigen(M: Array) -> tuple[Array, Array]:
     if b == c == 0.0:
         return np.array([a, d]), np.eye(2)
     values = eigenvalues(M)
-    values = values.real if not values.imag.any() else values
     first, second = values.tolist()
     rows = [[b, b], [first - a, second - a]] if abs(b) >= abs(c) else [[first - d, second - d], [c, c]]
     return values, np.array(rows)
-
-
-def _inverses(P: Array) -> Array | None:
-    """Inverses of (S, n, n), None where one is singular."""
-    if P.shape[1] != 2:
-        try:
-            return np.asarray(np.linalg.inv(P))
-        except np.linalg.LinAlgError:
-            return None
-    determinant = P[:, 0, 0] * P[:, 1, 1] - P[:, 0, 1] * P[:, 1, 0]
-    if not determinant.all():
-        return None
-    out = np.empty_like(P)
-    out[:, 0, 0], out[:, 1, 1] = P[:, 1, 1], P[:, 0, 0]
-    out[:, 0, 1], out[:, 1, 0] = -P[:, 0, 1], -P[:, 1, 0]
-    return np.asarray(out / determinant[:, None, None])
 
 
 def _not_trivial(mu: Array) -> Array | None:
@@ -258,30 +235,13 @@ def _not_trivial(mu: Array) -> Array | None:
     return np.sort(order[1:]) if len(mu) < 2 or abs(mu[order[1]] - 1) > _APART else None
 
 
-def fourier_basis_of(harmonics: int, samples: int) -> Array:
-    """Analysis matrix (2H + 1, S) of S >= 2 H + 1 samples."""
-    if samples >= 4 * harmonics + 3:
-        return fourier_basis(harmonics, samples).analysis
-    known = _ANALYSIS.get((harmonics, samples))
-    if known is None:
-        known = series(harmonics, np.arange(samples) / samples).T * (2.0 / samples)
-        known[0] *= 0.5
-        _ANALYSIS[harmonics, samples] = known
-    return known
-
-
-_ANALYSIS: dict[tuple[int, int], Array] = {}
-
-
 def checked_spectrum(L: HarmonicLinearisation) -> Spectrum:
     """Hill multipliers without the trivial one, their error, counts and verdict."""
     problem = L.problem
-    n, own = problem.layout.n, problem.own
-    unknown = np.full(n - own, np.nan, complex)
-    if not np.isfinite(L.J).all():
-        return orbit_spectrum(unknown, np.inf)
-    found = L.correction
-    along = propagated(L, found) if np.isfinite(found.error) else None
+    own, found = problem.own, L.correction
+    if not found.error < np.inf and not np.isfinite(L.J).all():
+        return orbit_spectrum(np.full(problem.layout.n - own, np.nan, complex), np.inf)
+    along = propagated(L, found) if found.error < np.inf else None
     if along is not None:
         refined = _refined(L, along)
         if refined is not None:
@@ -313,7 +273,11 @@ def _floor(along: Propagation) -> float:
 
 def _ordered(values: Array) -> Array:
     """By descending modulus, conjugates side by side, the upper one first."""
-    return np.asarray(values[np.lexsort((-values.imag, -np.abs(values).round(14)))])
+    return np.array(sorted(values.tolist(), key=_rank), complex)
+
+
+def _rank(value: complex) -> tuple[float, float]:
+    return -round(abs(value), 14), -value.imag
 
 
 def _with_small_ones(values: Array, others: Array) -> Array:

@@ -16,13 +16,16 @@ from __future__ import annotations
 
 import math
 import warnings
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.linalg.lapack import dgetrs
 
 from ..errors import TruncationWarning
 from ..kernels.fourier import resized, series, tail_fit
+from ..kernels.harmonic_stability import corrected, missing
 from ..protocols import Tangent
 from .harmonic_layout import slope_of
 from .orbit_adaption import natural_sizes, state_scales
@@ -41,129 +44,93 @@ _ALIAS = 0.1  # largest share of aliasing in the error that is left alone
 _ROUNDING = 1e-13
 
 
-class Correction(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Correction:
     """What the harmonics that are missing would change.
 
-    coefficients (2K + 1, q) of the corrected orbit, its period; error (largest change of a state over its scale); the
-    part of it that comes from aliasing; sizes (K,) of harmonics 1 .. K over the scales.
+    Attributes
+    ----------
+    coefficients : (2K + 1, q) of the corrected orbit;  period : its period
+    error : largest change of a state over its scale
+    aliasing : the part of it that comes from aliasing
+    units : (q,) scales of the unknown series
     """
 
     coefficients: Array
     period: float
     error: float
     aliasing: float
-    sizes: Array
+    units: Array
+
+    @property
+    def sizes(self) -> Array:
+        """(K,) largest sizes of harmonics 1 .. K over the scales."""
+        return np.asarray((np.hypot(self.coefficients[1::2], self.coefficients[2::2]) / self.units).max(axis=1))
 
 
-def _doubled_analysis(problem: HarmonicBalance) -> tuple[Array, Array, Array, Array, Array]:
+@lru_cache(maxsize=64)
+def _between(harmonics: int, samples: int, multiple: int) -> tuple[Array, ...]:
     """(points s between the samples, their matrices G and G D of H harmonics, analysis to K, phases)."""
-    known = problem._memo.get("between")
-    if known is None:
-        layout = problem.layout
-        s = layout.basis.points + 0.5 / layout.samples
-        G = series(layout.harmonics, s)
-        analysis = series(2 * layout.harmonics + 1, s).T * (2.0 / layout.samples)
-        analysis[0] *= 0.5
-        phase = np.mod(problem.multiple * s, 1.0)
-        known = problem._memo["between"] = (s, G, slope_of(G), analysis, phase)
-    return known  # type: ignore[no-any-return]
+    s = (np.arange(samples) + 0.5) / samples
+    G = series(harmonics, s)
+    analysis = series(2 * harmonics + 1, s).T * (2.0 / samples)
+    analysis[0] *= 0.5
+    return s, G, slope_of(G), np.ascontiguousarray(analysis), np.mod(multiple * s, 1.0)
 
 
-def _upper_basis(problem: HarmonicBalance) -> tuple[Array, Array]:
+@lru_cache(maxsize=64)
+def _upper_basis(harmonics: int, samples: int) -> tuple[Array, Array]:
     """G and G D (N, 2H + 2) of the harmonics H + 1 .. K at the samples."""
-    known = problem._memo.get("upper")
+    G, first = series(2 * harmonics + 1, np.arange(samples) / samples), 2 * harmonics + 1
+    return np.ascontiguousarray(G[:, first:]), np.ascontiguousarray(slope_of(G)[:, first:])
+
+
+def _tables(problem: HarmonicBalance) -> tuple[Any, ...]:
+    """(address of F, points between the samples, basis of the upper harmonics, units of the series)."""
+    known = problem._memo.get("tables")
     if known is None:
         layout = problem.layout
-        G = series(2 * layout.harmonics + 1, layout.basis.points)
-        known = problem._memo["upper"] = (
-            np.ascontiguousarray(G[:, layout.count :]), np.ascontiguousarray(slope_of(G)[:, layout.count :])
-        )
+        between = _between(layout.harmonics, layout.samples, problem.multiple)
+        upper = _upper_basis(layout.harmonics, layout.samples)
+        units, address = problem.scales[layout.unknowns], problem.evaluations.address("F")
+        known = problem._memo["tables"] = address, between, upper, units
     return known  # type: ignore[no-any-return]
 
 
 def correction(L: HarmonicLinearisation) -> Correction:
     """One Newton step in the harmonics up to K = 2H + 1; see the head of this file."""
     problem, layout = L.problem, L.problem.layout
-    H, q, rows = layout.harmonics, layout.q, layout.rows
-    failed = Correction(resized(L.c, 2 * H + 1), L.period, np.inf, 0.0, np.zeros(2 * H + 1))
-    if not np.isfinite(L.J).all():
-        return failed
-    force = layout.basis.spectrum @ L.F[:, rows]
-    if not problem.exact_samples:
-        s, G, slope, analysis, phase = _doubled_analysis(problem)
-        X = layout.states_by(G, slope, s, L.c, L.omega)
-        finer = 0.5 * (force + analysis @ problem.evaluations.F(phase, X, L.params)[:, rows])
-        alias = finer[: layout.count] - force[: layout.count]
-        force = finer
-    upper = _upper_harmonics(L, force[layout.count :])
-    G_upper, slope_upper = _upper_basis(problem)
-    places, velocities = layout.pairs
-    change = np.zeros_like(L.X)
-    change[:, layout.unknowns] = G_upper @ upper
-    change[:, velocities] = L.omega * (slope_upper @ upper[:, places])
-    pushed = (L.J[:, rows] @ change[:, :, None])[:, :, 0]
-    lower = layout.basis.analysis @ pushed - L.residual[: layout.count * q].reshape(layout.count, q)
-    sides = [lower.ravel()] if problem.exact_samples else [(lower + alias).ravel(), alias.ravel()]
-    step = _lower_step(L, np.stack(sides, axis=1))
-    if step is None:
-        return failed
-    size = layout.count * q
-    delta = step[:size, 0].reshape(layout.count, q)
-    d_omega = -L.omega / L.period * float(step[-1, 0]) if problem.own else 0.0
-    change += _lower_states(L, delta, d_omega)
-    aliasing = 0.0
-    if not problem.exact_samples:
-        by_alias = _lower_states(L, step[:size, 1].reshape(layout.count, q), 0.0)
-        aliasing = float((np.abs(by_alias) / problem.scales).max())
-    coefficients = np.concatenate([L.c + delta, upper])
-    per_harmonic = np.hypot(coefficients[1::2], coefficients[2::2]) / problem.scales[layout.unknowns]
-    period = L.period + (float(step[-1, 0]) if problem.own else 0.0)
-    error = float((np.abs(change) / problem.scales).max())
-    if problem.own:
-        error = max(error, abs(period - L.period) / L.period)
-    return Correction(coefficients, period, error, aliasing, per_harmonic.max(axis=1))
+    address, between, upper_basis, units = _tables(problem)
+    kept, count, q = problem._fixed[0][-1], layout.count, layout.q
+    upper, change = np.empty((count + 1, q)), np.empty_like(L.X)
+    order = L.u.size if L.factors is None else len(L.factors[1])
+    sides = np.empty((1 if problem.exact_samples else 2, order))
+    missing(
+        address, L.params, L.omega, layout.basis.spectrum, between, upper_basis, kept, L.filled, L.c, upper, change,
+        sides,
+    )  # fmt: skip
+    steps = _lower_steps(L, sides)
+    coefficients = np.empty((2 * count + 1, q))
+    period, error, aliasing = corrected(
+        layout.basis.synthesis, layout.basis.slope, kept, L.X, L.c, upper, L.period, problem.own, problem.scales, steps,
+        change, coefficients,
+    )  # fmt: skip
+    if not error < np.inf:
+        return Correction(resized(L.c, 2 * layout.harmonics + 1), L.period, np.inf, 0.0, units)
+    return Correction(coefficients, period, error, aliasing, units)
 
 
-def _upper_harmonics(L: HarmonicLinearisation, force: Array) -> Array:
-    """(2H + 2, q): Z_k x_k = f_k for the harmonics H + 1 .. K."""
-    layout = L.problem.layout
-    H = layout.harmonics
-    places, velocities = layout.pairs
-    mean = L.J[:, layout.rows].mean(axis=0)
-    ik = 1j * L.omega * np.arange(H + 1, 2 * H + 2)[:, None, None]
-    Z = np.where(layout.second, ik**2, ik) * np.eye(layout.q) - mean[:, layout.unknowns]
-    Z[:, :, places] -= ik * mean[:, velocities]
-    right = force[::2] - 1j * force[1::2]
-    # a harmonic that resonates in the mean system is not a matter of this estimate: keep the solve regular
-    x = right / Z[:, 0] if layout.q == 1 else np.linalg.solve(Z, right[:, :, None])[:, :, 0]
-    out = np.empty_like(force)
-    out[::2], out[1::2] = x.real, -x.imag
-    return out
-
-
-def _lower_states(L: HarmonicLinearisation, delta: Array, d_omega: float) -> Array:
-    """Change (N, n) of the states at the samples by that of the first H harmonics and of the frequency."""
-    layout = L.problem.layout
-    places, velocities = layout.pairs
-    out = np.zeros_like(L.X)
-    out[:, layout.unknowns] = layout.basis.synthesis @ delta
-    out[:, velocities] = L.omega * (layout.basis.slope @ delta[:, places]) + d_omega / L.omega * L.X[:, velocities]
-    return out
-
-
-def _lower_step(L: HarmonicLinearisation, force: Array) -> Array | None:
-    """F_u x = force, orthogonal to the branch where its tangent is known, else of least length if F_u is singular."""
-    problem = L.problem
-    sides = force.shape[1]
-    if problem.own:
-        force = np.vstack([force, np.zeros((1, sides))])
+def _lower_steps(L: HarmonicLinearisation, sides: Array) -> Array:
+    """(k, order): F_u x = side, orthogonal to the branch where its tangent is known, else of least length."""
+    problem, size = L.problem, L.u.size
+    sides[:, :size] /= problem.row_sizes
     if L.factors is not None:
-        lu, pivots = L.factors
-        x = dgetrs(lu, pivots, np.vstack([force / problem.row_sizes[:, None], np.zeros((1, sides))]))[0][:-1]
-    else:
-        x, *_ = np.linalg.lstsq(L.core, force / problem.row_sizes[:, None], rcond=1e-7)
-        x = x * problem.column_sizes[:, None]
-    return x if np.isfinite(x).all() else None
+        dgetrs(*L.factors, sides.T, overwrite_b=1)
+        return sides
+    if not (np.isfinite(sides).all() and np.isfinite(L.core).all()):
+        return np.full_like(sides, np.nan)
+    x, *_ = np.linalg.lstsq(L.core, sides.T, rcond=1e-7)
+    return np.ascontiguousarray((x * problem.column_sizes[:, None]).T)
 
 
 # ---------------------------------------------------------------------- what to do about it
@@ -199,13 +166,13 @@ def adapted(
     if ((ratios > 2) | (ratios < 0.5)).any():
         fields |= {"scales": scales, "period_scale": period_scale}
     worst = found.error * float((problem.scales / scales).max()) if fields else found.error
-    harmonics = _wanted_harmonics(problem, found._replace(error=worst)) if problem.adaptive else problem.harmonics
+    harmonics = _wanted_harmonics(problem, replace(found, error=worst)) if problem.adaptive else problem.harmonics
     if harmonics != problem.harmonics:
         fields["harmonics"] = harmonics
     elif not problem.fixed_samples and found.aliasing > max(_ALIAS * found.error, _ROUNDING):
         fields |= {"samples": 2 * problem.samples} if problem.samples < _MOST_SAMPLES * harmonics else {}
     if not problem.adaptive or harmonics >= _MOST:
-        warn_of_truncation(problem, found._replace(error=worst), params)
+        warn_of_truncation(problem, replace(found, error=worst), params)
     if not fields:
         return None
     new = problem.changed(**fields)
