@@ -26,81 +26,11 @@ from __future__ import annotations
 import numpy as np
 
 from stability.kernels.caching import kernel
+from stability.kernels.elimination import eliminate_lanes, substitute_lanes
 
 __all__ = ["condense", "solve_stages", "solve_stages_transposed"]
 
-
-@kernel(inline=True)
-def eliminate(T, rows, size, width, swaps):  # type: ignore[no-untyped-def]
-    """LU with row interchanges of the first `size` columns of T[:rows], applied to all `width` columns.
-
-    Right-looking, four columns at a time. Row interchanges move the multipliers, kept below the diagonal, too (LAPACK's
-    convention); `swaps` (size,) receives the pivot rows. Returns the sign of the product of the pivots and
-    interchanges, 0 where a pivot is zero or not finite.
-    """
-    sign = 1.0
-    for start in range(0, size, 4):
-        stop = min(start + 4, size)
-        for p in range(start, stop):
-            best, row = abs(T[p, p]), p
-            for i in range(p + 1, rows):
-                value = abs(T[i, p])
-                if value > best:
-                    best, row = value, i
-            swaps[p] = row
-            if not (best > 0.0 and best < np.inf):
-                return 0.0
-            if row != p:
-                sign = -sign
-                for k in range(width):
-                    T[p, k], T[row, k] = T[row, k], T[p, k]
-            if T[p, p] < 0.0:
-                sign = -sign
-            inverse = 1.0 / T[p, p]
-            for i in range(p + 1, rows):
-                factor = T[i, p] * inverse
-                T[i, p] = factor
-                for k in range(p + 1, stop):
-                    T[i, k] -= factor * T[p, k]
-        for p in range(start + 1, stop):
-            for i in range(start, p):
-                factor = T[p, i]
-                for k in range(stop, width):
-                    T[p, k] -= factor * T[i, k]
-        if stop == start + 4:
-            for i in range(stop, rows):
-                f, g, h, e = T[i, start], T[i, start + 1], T[i, start + 2], T[i, start + 3]
-                for k in range(stop, width):
-                    T[i, k] -= f * T[start, k] + g * T[start + 1, k] + h * T[start + 2, k] + e * T[start + 3, k]
-        else:
-            for p in range(start, stop):
-                for i in range(stop, rows):
-                    factor = T[i, p]
-                    for k in range(stop, width):
-                        T[i, k] -= factor * T[p, k]
-    return sign
-
-
-@kernel(inline=True)
-def back_substitute(T, size, width):  # type: ignore[no-untyped-def]
-    """Solve with the upper triangle of T[:size, :size] for the columns size .. width, in place, four rows at a time."""
-    stop = size
-    while stop > 0:
-        start = max(stop - 4, 0)
-        for p in range(stop - 1, start - 1, -1):
-            inverse = 1.0 / T[p, p]
-            for k in range(size, width):
-                T[p, k] *= inverse
-            for i in range(start, p):
-                factor = T[i, p]
-                for k in range(size, width):
-                    T[i, k] -= factor * T[p, k]
-        if stop - start == 4:
-            for i in range(start):
-                f, g, h, e = T[i, start], T[i, start + 1], T[i, start + 2], T[i, start + 3]
-                for k in range(size, width):
-                    T[i, k] -= f * T[start, k] + g * T[start + 1, k] + h * T[start + 2, k] + e * T[start + 3, k]
-        stop = start
+LANES, MEMORY = 64, 131072  # intervals at a time: at most so many, fewer where their numbers exceed a megabyte
 
 
 @kernel(inline=True)
@@ -120,60 +50,105 @@ def _integrated(A, kept, position, n, columns, j, H):  # type: ignore[no-untyped
 
 
 @kernel(inline=True)
-def _assemble(W, A, row_sums, scale, J, first, kept, position, columns, j, H, T):  # type: ignore[no-untyped-def]
-    """T = [G' | du_0 columns | C'] of interval j; `first` is the index of its first stage in J."""
-    degree, small, n = W.shape[0], kept.shape[0], J.shape[1]
-    size, extra = degree * small, columns.shape[2]
-    for i in range(degree):
-        for c in range(small):
-            row, state = i * small + c, kept[c]
-            for k in range(size + n):
-                T[row, k] = 0.0
-            for e in range(extra):
-                T[row, size + n + e] = columns[j, i * n + state, e]
-            for k in range(degree):
-                T[row, k * small + c] = W[i, k]
-            T[row, size + state] = row_sums[i]
-            for b in range(small):
-                T[row, i * small + b] -= scale * J[first + i, state, kept[b]]
-                a = position[b]
-                if a >= 0:
-                    slope = scale * J[first + i, state, a]
-                    if slope != 0.0:
-                        T[row, size + a] += slope
-                        twice = slope * scale
-                        for k in range(degree):
-                            T[row, k * small + b] -= twice * A[i, k]
-                        for e in range(extra):
-                            T[row, size + n + e] += slope * H[i, b, e]
-
-
-@kernel(inline=True)
-def _expand(A, scale, kept, position, T, size, n, H, columns, Z, j):  # type: ignore[no-untyped-def]
-    """The stages of all states from those of the kept ones: columns[j] (mn, K) and Z[j] (mn, n)."""
+def _expand(A, scale, kept, position, T, size, n, H, columns, j):  # type: ignore[no-untyped-def]
+    """The stages of all states from those of the kept ones: columns[j] (mn, K)."""
     degree, small, extra = A.shape[0], kept.shape[0], columns.shape[2]
     for c in range(small):
         a, state = position[c], kept[c]
         for i in range(degree):
-            for b in range(n):
-                Z[j, i * n + state, b] = T[i * small + c, size + b]
             for e in range(extra):
-                columns[j, i * n + state, e] = T[i * small + c, size + n + e]
+                columns[j, i * n + state, e] = T[i * small + c, e]
         if a < 0:
             continue
         for i in range(degree):
-            row = i * n + a
-            for b in range(n):
-                Z[j, row, b] = 0.0
-            Z[j, row, a] = 1.0
             for e in range(extra):
-                columns[j, row, e] = H[i, c, e]
+                columns[j, i * n + a, e] = H[i, c, e]
             for k in range(degree):
                 factor = scale * A[i, k]
-                for b in range(n):
-                    Z[j, row, b] += factor * T[k * small + c, size + b]
                 for e in range(extra):
-                    columns[j, row, e] += factor * T[k * small + c, size + n + e]
+                    columns[j, i * n + a, e] += factor * T[k * small + c, e]
+
+
+# ---------------------------------------------------------------------- many intervals at a time
+@kernel(inline=True)
+def _template(W, A, row_sums, kept, position, n, columns, first, lanes, T, H):  # type: ignore[no-untyped-def]
+    """What of T = [G' | du_0 columns | C'] does not depend on J, and H: sum_k A_ik C_k of the equations x' = v."""
+    degree, small, extra = W.shape[0], kept.shape[0], columns.shape[2]
+    size = degree * small
+    for i in range(degree):
+        for c in range(small):
+            row, a = i * small + c, position[c]
+            for k in range(size + n):
+                for q in range(lanes):
+                    T[row, k, q] = 0.0
+            for k in range(degree):
+                for q in range(lanes):
+                    T[row, k * small + c, q] = W[i, k]
+            for q in range(lanes):
+                T[row, size + kept[c], q] = row_sums[i]
+            for e in range(extra):
+                for q in range(lanes):
+                    T[row, size + n + e, q] = columns[first + q, i * n + kept[c], e]
+                    H[i, c, e, q] = 0.0
+                if a >= 0:
+                    for k in range(degree):
+                        for q in range(lanes):
+                            H[i, c, e, q] += A[i, k] * columns[first + q, k * n + a, e]
+
+
+@kernel(inline=True)
+def _assemble(A, scale, J, kept, position, extra, first, lanes, H, slope, T):  # type: ignore[no-untyped-def]
+    """Add what depends on the Jacobians J of the intervals first .. first + lanes."""
+    degree, small, n = A.shape[0], kept.shape[0], J.shape[1]
+    size = degree * small
+    for i in range(degree):
+        for c in range(small):
+            row, state = i * small + c, kept[c]
+            for b in range(small):
+                column, a = i * small + b, position[b]
+                for q in range(lanes):
+                    T[row, column, q] -= scale[q] * J[(first + q) * degree + i, state, kept[b]]
+                if a < 0:
+                    continue
+                for q in range(lanes):
+                    slope[q] = scale[q] * J[(first + q) * degree + i, state, a]
+                    T[row, size + a, q] += slope[q]
+                for e in range(extra):
+                    for q in range(lanes):
+                        T[row, size + n + e, q] += slope[q] * H[i, b, e, q]
+                for q in range(lanes):
+                    slope[q] *= scale[q]
+                for k in range(degree):
+                    for q in range(lanes):
+                        T[row, k * small + b, q] -= slope[q] * A[i, k]
+
+
+@kernel(inline=True)
+def _collect(A, scale, kept, position, T, size, n, H, first, lanes, hold, columns, Z):  # type: ignore[no-untyped-def]
+    """The stages of all states from those of the kept ones: columns (N, mn, K) and Z (N, mn, n)."""
+    degree, small, extra = A.shape[0], kept.shape[0], columns.shape[2]
+    for c in range(small):
+        a, state = position[c], kept[c]
+        for i in range(degree):
+            for b in range(n + extra):
+                for q in range(lanes):
+                    value = T[i * small + c, size + b, q]
+                    if b < n:
+                        Z[first + q, i * n + state, b] = value
+                    else:
+                        columns[first + q, i * n + state, b - n] = value
+                if a < 0:
+                    continue
+                for q in range(lanes):
+                    hold[q] = 0.0
+                for k in range(degree):
+                    for q in range(lanes):
+                        hold[q] += A[i, k] * T[k * small + c, size + b, q]
+                for q in range(lanes):
+                    if b < n:
+                        Z[first + q, i * n + a, b] = scale[q] * hold[q] + (1.0 if a == b else 0.0)
+                    else:
+                        columns[first + q, i * n + a, b - n] = scale[q] * hold[q] + H[i, c, b - n, q]
 
 
 @kernel
@@ -181,31 +156,37 @@ def condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, p
     """Factor every interval, overwrite `columns` (N, mn, K) by X = G^-1 C, fill LU, pivots, Z (N, mn, n), M (N, n, n).
 
     LU (N, ms, ms) and pivots (N, ms) belong to the s kept states. Returns the product of the signs of the determinants
-    (0: a singular interval).
+    (0: a singular interval). Intervals are eliminated together, LANES at most, each step for all of them.
     """
     intervals, extra = columns.shape[0], columns.shape[2]
     degree, small, n = W.shape[0], kept.shape[0], J.shape[1]
     size = degree * small
-    T, H = np.empty((size, size + n + extra)), np.empty((degree, small, extra))
-    swaps = np.empty(size, np.int64)
+    width = size + n + extra
+    most = min(intervals, min(LANES, max(16, MEMORY // (size * width))))
+    T, H = np.empty((size, width, most)), np.empty((degree, small, extra, most))
+    swaps, hold, scale = np.empty((size, most), np.int64), np.empty(most), np.empty(most)
     total = 1.0
     for i in range(degree):
         total -= update[i]
     sign = 1.0
-    for j in range(intervals):
-        scale = h[j] * sigma
-        _integrated(A, kept, position, n, columns, j, H)
-        _assemble(W, A, row_sums, scale, J, j * degree, kept, position, columns, j, H, T)
-        one = eliminate(T, size, size, size + n + extra, swaps)
-        sign *= one
-        if one == 0.0:
+    for first in range(0, intervals, most):
+        lanes = min(most, intervals - first)
+        for q in range(lanes):
+            scale[q] = h[first + q] * sigma
+        _template(W, A, row_sums, kept, position, n, columns, first, lanes, T, H)
+        _assemble(A, scale, J, kept, position, extra, first, lanes, H, hold, T)
+        sign *= eliminate_lanes(T, size, width, lanes, swaps, hold)
+        if sign == 0.0:
             return 0.0
         for row in range(size):
-            pivots[j, row] = swaps[row]
+            for q in range(lanes):
+                pivots[first + q, row] = swaps[row, q]
             for k in range(size):
-                LU[j, row, k] = T[row, k]
-        back_substitute(T, size, size + n + extra)
-        _expand(A, scale, kept, position, T, size, n, H, columns, Z, j)
+                for q in range(lanes):
+                    LU[first + q, row, k] = T[row, k, q]
+        substitute_lanes(T, size, width, lanes, hold)
+        _collect(A, scale, kept, position, T, size, n, H, first, lanes, hold, columns, Z)
+    for j in range(intervals):
         for a in range(n):
             for b in range(n):
                 value = total if a == b else 0.0
@@ -221,40 +202,34 @@ def solve_stages(A, h, sigma, J, kept, position, LU, pivots, columns):  # type: 
     intervals, extra = columns.shape[0], columns.shape[2]
     degree, small, n = A.shape[0], kept.shape[0], J.shape[1]
     size = degree * small
-    T, H, Z = np.empty((size, n + extra)), np.empty((degree, small, extra)), np.empty((1, degree * n, n))
-    part = np.empty((1, degree * n, extra))
+    T, H = np.empty((size, extra)), np.empty((degree, small, extra))
     for j in range(intervals):
         scale = h[j] * sigma
         _integrated(A, kept, position, n, columns, j, H)
         for i in range(degree):
             for c in range(small):
-                for b in range(n):
-                    T[i * small + c, b] = 0.0
                 for e in range(extra):
-                    T[i * small + c, n + e] = columns[j, i * n + kept[c], e]
+                    T[i * small + c, e] = columns[j, i * n + kept[c], e]
                 for b in range(small):
                     if position[b] >= 0:
                         slope = scale * J[j * degree + i, kept[c], position[b]]
                         for e in range(extra):
-                            T[i * small + c, n + e] += slope * H[i, b, e]
+                            T[i * small + c, e] += slope * H[i, b, e]
         for p in range(size):
             row = pivots[j, p]
             if row != p:
-                for k in range(n, n + extra):
+                for k in range(extra):
                     T[p, k], T[row, k] = T[row, k], T[p, k]
         for p in range(size):
             for i in range(p + 1, size):
-                for k in range(n, n + extra):
+                for k in range(extra):
                     T[i, k] -= LU[j, i, p] * T[p, k]
         for p in range(size - 1, -1, -1):
-            for k in range(n, n + extra):
+            for k in range(extra):
                 T[p, k] /= LU[j, p, p]
                 for i in range(p):
                     T[i, k] -= LU[j, i, p] * T[p, k]
-        _expand(A, scale, kept, position, T, 0, n, H, part, Z, 0)
-        for row in range(degree * n):
-            for e in range(extra):
-                columns[j, row, e] = part[0, row, e]
+        _expand(A, scale, kept, position, T, size, n, H, columns, j)
 
 
 @kernel

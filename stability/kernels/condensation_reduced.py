@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from stability.kernels.caching import kernel
-from stability.kernels.condensation import back_substitute, eliminate
+from stability.kernels.elimination import back_substitute, eliminate
 
 __all__ = ["monodromy_product", "reduce_and_solve"]
 

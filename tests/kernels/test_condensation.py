@@ -177,3 +177,22 @@ def test_a_singular_interval_is_reported_not_divided_by():
     assert c.condense(np.zeros((3, 2, 1))) == 0.0
     c.J[:] = np.nan
     assert c.condense(np.zeros((3, 2, 1))) == 0.0
+
+
+@pytest.mark.parametrize("case", [(1, 3, 3, False, 0.0), (2, 5, 4, True, 0.0), (3, 7, 5, False, 0.0)])
+def test_intervals_that_need_interchanges_beside_others_that_do_not(case):
+    """Jacobians up to 1e4 times too large for their mesh, against LAPACK; the sign of all determinants; a singular one."""
+    c = Case(*case, seed=1)
+    c.J[:, c.kept] *= 10.0 ** np.repeat(np.linspace(0, 4, c.N), c.rule.degree)[:, None, None]
+    blocks = np.array([c.block(j) for j in range(c.N)])
+    X = c.rng.standard_normal((c.N, c.size, 2))
+    wanted = np.linalg.solve(blocks, X)
+    assert c.condense(X) == np.prod(np.linalg.slogdet(blocks)[0])
+    moved = (c.pivots != np.arange(c.pivots.shape[1])).any(axis=1)
+    assert moved.any() or c.n == 1
+    assert np.abs(X - wanted).max() < 1e-9 * np.abs(wanted).max()
+    again = np.ascontiguousarray(blocks @ wanted)
+    solve_stages(*c.factors(), again)
+    assert np.abs(again - wanted).max() < 1e-9 * np.abs(wanted).max()
+    c.J[c.rule.degree :] = np.nan
+    assert c.condense(X) == 0.0
