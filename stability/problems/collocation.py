@@ -3,8 +3,8 @@ r"""Periodic orbits by Gauss collocation with condensation: `Collocation`.
     x' = sigma f(phase, x, p) on s in [0, 1],      x(1) = S x(0) + w,      sigma = span T,
 
 forced systems: T = T(p) is the forcing period, phase = frac(span s), span = k for orbits of k forcing periods (k/2
-where x(t + k T/2) = S x(t)); autonomous systems: T is the orbit's own period, an unknown, with an integral phase
-condition.
+where x(t + k T/2) = S x(t), see orbit_symmetry); autonomous systems: T is the orbit's own period, an unknown, with an
+integral phase condition.
 Polynomials of degree m on N intervals through the Gauss points (order 2m at the nodes); each Newton solve is one
 compiled call (kernels/condensation_newton.py), from which the tangent, the determinant sign and the monodromy matrix
 fall out. The error is estimated by one Newton step at degree m + 1 from the same orbit, which gives the change of the
@@ -37,6 +37,7 @@ from .orbit_adaption import adapted
 from .orbit_mesh import OrbitMesh
 from .orbit_spectrum import contracted, deflated, eigenvalues, liouville_gap, orbit_spectrum
 from .orbit_starts import doubled_problem
+from .orbit_symmetry import Mirror, broken, chosen, symmetric_doubled
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
 
 __all__ = ["Collocation"]
@@ -65,26 +66,31 @@ class Collocation(OrbitDiscretisation):
     degree : int
         Polynomial degree m on each interval, 1 to 11.
     intervals : int
-        Number of mesh intervals to start with, and the smallest that `adapt` goes back to.
+        Number of mesh intervals to start with, and the smallest that `adapt` goes back to; 20, or 10 on half a period.
     multiple : int
         Orbits of k forcing periods (a doubled orbit: 2). Autonomous systems: leave it at 1.
     winding : mapping of angle -> whole number of turns per orbit, or array (n,) in radians
-        x(end) = x(0) + 2 pi k for the angles a system declares.
-    symmetry : (n, n) array, optional
-        S of x(t + k T/2) = S x(t), S S = I: the orbit is solved on half of its period. The multipliers are those of the
-        half-period map S^-1 Phi(T/2): -1 is the loss of the symmetry (a pitchfork of the whole orbit), not a doubling,
-        although the branch labels it PD.
+        x(end) = x(0) + 2 pi k for the angles a system declares; with `symmetry` the end is that of half the orbit.
+    symmetry : Symmetry, mapping such as ``{"u": "-u"}``, signed permutation (n, n), "auto" or None
+        S of x(t + P/2) = S x(t), P the orbit's period: only such orbits are sought, on half of the period, at half the
+        cost. A multiplier -1 of the half-period map N = S^-1 Phi(P/2) is the loss of the symmetry: a branch point,
+        ``symmetry_breaking``; those of the whole period, N^2, are shown. "auto": one of ``system.symmetries`` that
+        allows it, the whole period where none does; symmetric doubled orbits are solved on their half, too.
     accuracy : float
         Wanted error of the nodes over the states' scales; `adapt` chooses the number of intervals for it.
     adaptive : bool
         False keeps the mesh as it is (the scales still follow the solution).
     edges, scales, period_scale : arrays and number, optional
         Mesh in s (N + 1,), sizes of the states (n,) and of the period; by default uniform, 1 and 1, set by `adapt`.
+    automatic : bool
+        Whether "auto" was asked for.
+    mirror : Mirror, optional
+        How a family without a symmetry is mapped to its image; set by `switch`.
 
     Raises
     ------
-    InputError, UnknownNameError
-        Before any computation.
+    InputError, UnknownNameError, EquationError
+        Before any computation; EquationError: the equations do not have that symmetry.
 
     Examples
     --------
@@ -98,7 +104,7 @@ class Collocation(OrbitDiscretisation):
 
     system: Any
     degree: int = 5
-    intervals: int = 20
+    intervals: Any = None
     multiple: int = 1
     winding: Any = None
     symmetry: Any = None
@@ -107,20 +113,25 @@ class Collocation(OrbitDiscretisation):
     edges: Any = None
     scales: Any = None
     period_scale: float = 1.0
+    automatic: bool = False
+    mirror: Any = None
     _memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         refuse_stops(self.system, "Collocation")
         n = self.system.n
+        object.__setattr__(self, "automatic", bool(self.automatic or str(self.symmetry) == "auto"))
+        object.__setattr__(self, "symmetry", chosen(self.system, self.symmetry, self.multiple))
+        object.__setattr__(self, "mirror", Mirror.of(self.mirror))
+        symmetric = self.symmetry is not None
+        if self.intervals is None:
+            object.__setattr__(self, "intervals", 10 if symmetric else 20)
         for name, low, high in (("degree", 1, 11), ("intervals", 1, _MAX_INTERVALS), ("multiple", 1, 64)):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), low, high))
         if not self.accuracy > 0:
             raise InputError(f"accuracy = {self.accuracy!r}: a positive number is needed (1e-9 is the default)")
-        symmetric = self.symmetry is not None
         object.__setattr__(self, "span", self.multiple * (0.5 if symmetric else 1.0))
-        matrix = np.array(self.symmetry, float) if symmetric else np.eye(n)
-        if matrix.shape != (n, n) or not abs(np.linalg.det(matrix)) > 1e-12:
-            raise InputError(f"symmetry must be a regular ({n}, {n}) matrix, got shape {matrix.shape}")
+        matrix = self.symmetry.matrix if symmetric else np.eye(n)
         scales = np.ones(n) if self.scales is None else np.array(self.scales, float)
         if scales.shape != (n,) or not (scales > 0).all():
             raise InputError(f"scales must be {n} positive numbers, got {self.scales!r}")
@@ -130,7 +141,6 @@ class Collocation(OrbitDiscretisation):
             edges = np.array(self.edges, float)
             if edges.ndim != 1 or len(edges) < 2 or not (np.diff(edges) > 0).all() or edges[0] != 0 or edges[-1] != 1:
                 raise InputError("edges must ascend from 0 to 1")
-        object.__setattr__(self, "symmetry", matrix if symmetric else None)
         for name, value in (("closure", matrix), ("scales", scales), ("edges", edges)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -141,12 +151,33 @@ class Collocation(OrbitDiscretisation):
         """Breaks of the forcing at `params` as points s of the orbit, ascending, in [0, 1)."""
         breaks = self.flow.breaks(params)
         points = (breaks[:, None] + np.arange(np.ceil(self.span))).ravel() / self.span
+        if self.mirror is not None and self.mirror.fraction and not (np.abs(points - 0.5) < 1e-12).any():
+            points = np.append(points, 0.5)
         return np.asarray(np.sort(points[points < 1 - 1e-12]))
 
     @property
     def halved(self) -> bool:  # type: ignore[override]
         """Whether the orbit is solved on half of its period."""
-        return self.mesh.span != self.multiple
+        return self.symmetry is not None
+
+    @property
+    def whole_winding(self) -> Array:
+        """x(P) - x(0) of the whole orbit (n,)."""
+        return np.asarray(self.closure @ self.winding + self.winding if self.halved else self.winding)
+
+    def start(self, params: Array, guess: Any = None) -> Array:
+        """A converged u from a guess, see `OrbitDiscretisation.start`; refuses values that break the symmetry."""
+        for name in self.symmetry.fixed if self.halved else ():
+            self.check_free(name, float(params[self.index(name)]))
+        return super().start(params, guess)
+
+    def check_free(self, name: str, value: float = np.nan) -> None:
+        """InputError for a parameter that must stay where the system has it, or the symmetry is lost."""
+        if self.halved and name in self.symmetry.fixed and value != self.system.parameters[name]:
+            raise InputError(
+                f"'{name}' breaks the symmetry {self.symmetry!r}: with it the orbit is to be solved on its whole "
+                "period, symmetry=None"
+            )
 
     # ------------------------------------------------------------------ what the problem is
     mesh: OrbitMesh = field(init=False, repr=False)
@@ -232,12 +263,14 @@ class Collocation(OrbitDiscretisation):
             "intervals": self.intervals,
             "multiple": self.multiple,
             "winding": self.winding.tolist(),
-            "symmetry": self.symmetry.tolist() if self.halved else None,
+            "symmetry": self.closure.tolist() if self.halved else None,
             "accuracy": self.accuracy,
             "adaptive": self.adaptive,
             "edges": self.edges.tolist(),
             "scales": self.scales.tolist(),
             "period_scale": self.period_scale,
+            "automatic": self.automatic,
+            "mirror": None if self.mirror is None else self.mirror.plain,
         }
         if self.system.function is not None:
             return {**own, "view_only": True}
@@ -256,6 +289,7 @@ class Collocation(OrbitDiscretisation):
         self, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
     ) -> Corrected:
         """The bordered Newton solve of `protocols.Problem`, in one compiled call."""
+        self.check_free(free)
         return self.newton(self.mesh, u, params, self.index(free), tangent, ds, tolerance, None)
 
     def newton(
@@ -343,8 +377,14 @@ class Collocation(OrbitDiscretisation):
         return adapted(self, u, params, tangent)
 
     def doubled(self, u: Array, params: Array, vector: Array) -> tuple[Collocation, Array, Array]:
-        """The problem of twice the period, the orbit run through twice, and the direction (v(s), -v(s))."""
-        return doubled_problem(self, u, params, vector)
+        """The problem of twice the period, the orbit run through twice, and the direction (v(s), -v(s)).
+
+        On half of a period N v = -v breaks the symmetry: the problem of the whole period, not of twice of it.
+        """
+        if self.halved:
+            return broken(self, u, params, vector)
+        symmetric = symmetric_doubled(self, u, params, vector) if self.automatic else None
+        return symmetric or doubled_problem(self, u, params, vector)
 
     # ------------------------------------------------------------------ spectrum and error
     def error(self, u: Array, params: Array) -> float:
@@ -365,7 +405,10 @@ class Collocation(OrbitDiscretisation):
         values = eigenvalues(M)
         error += multiplier_error(self, linearisation, values, direction if self.mesh.own else None)
         error += 1e-15 * float(np.abs(M).max()) * len(M)
-        values = contracted(values, linearisation.work.M) if not self.halved else values
+        factors = linearisation.work.M
+        if self.halved:
+            factors = np.concatenate([factors, np.linalg.inv(self.closure)[None]])
+        values = contracted(values, factors)
         error += liouville_gap(values, self._growth_of_volume(linearisation), self.orientation)
         return orbit_spectrum(values, error, self._area_preserving(linearisation))
 
@@ -383,6 +426,8 @@ class Collocation(OrbitDiscretisation):
     def _area_preserving(self, linearisation: CollocationLinearisation) -> bool:
         """Whether a forced system of two states has no divergence, hence det M = 1."""
         J = linearisation.work.J
+        if np.linalg.det(self.closure) < 0:
+            return False
         if self.mesh.n != 2 or self.mesh.own or float(np.abs(J[:, 0, 0] + J[:, 1, 1]).max()) != 0.0:
             return False
         return self.flow.divergence_free(linearisation.params)

@@ -46,7 +46,7 @@ def orbit_measures(problem: OrbitDiscretisation, u: Array, params: Array) -> dic
     points = (edges[:-1, None] + h[:, None] * rule.points).ravel()
     weights = (h[:, None] * rule.weights).ravel()
     stages = values[:, 1:].reshape(len(points), len(states))
-    turning = problem.winding * (2 if problem.halved else 1)
+    turning = problem.whole_winding
     swing = stages - points[:, None] * turning if turning.any() else stages
     harmonic = (weights * np.exp(-2j * np.pi * points)) @ swing
     for k, name in enumerate(problem.system.coordinates):
@@ -68,6 +68,7 @@ def orbit_view(problem: OrbitDiscretisation, u: Array, params: Array) -> Periodi
     linearisation = problem.linearise(u, params)
     spectrum = problem.spectrum(linearisation)
     multipliers = spectrum.values
+    halves = multipliers if problem.halved else None
     if problem.halved:
         multipliers = multipliers**2
     if problem.own:
@@ -77,7 +78,7 @@ def orbit_view(problem: OrbitDiscretisation, u: Array, params: Array) -> Periodi
         problem.system.states, edges * period, gauss_rule(degree).abscissae, values,
         dict(zip(problem.parameters, params.tolist())), multipliers=multipliers, verdict=spectrum.verdict,
         error=problem.error(u, params), residual=linearisation.size_of_residual,
-        winding=problem.winding * (2 if problem.halved else 1),
+        winding=problem.whole_winding, half_multipliers=halves,
     )  # fmt: skip
 
 

@@ -39,7 +39,7 @@ def discretised(problem: OrbitDiscretisation, times: Array, states: Array, perio
     states = np.asarray(states, float)
     count = states.shape[1]
     phase = (times - times[0]) / period
-    coefficients = np.fft.rfft(states - phase * problem.winding[:, None], axis=1) / count
+    coefficients = np.fft.rfft(states - phase * problem.whole_winding[:, None], axis=1) / count
     if count % 2 == 0:
         coefficients[:, -1] *= 0.5
     k = np.arange(coefficients.shape[1])
@@ -48,7 +48,7 @@ def discretised(problem: OrbitDiscretisation, times: Array, states: Array, perio
     def function(t: Array) -> Array:
         s = (t - times[0]) / period
         waves = (factor * coefficients) @ np.exp(2j * np.pi * np.outer(k, s))
-        return np.asarray(waves.real + s * problem.winding[:, None])
+        return np.asarray(waves.real + s * problem.whole_winding[:, None])
 
     return from_function(problem, function, period)
 
@@ -57,12 +57,10 @@ def doubled_problem(problem: Collocation, u: Array, params: Array, vector: Array
     """Twice the period: the mesh twice, the orbit twice, and the variation (v(s), -v(s)) of M v = -v."""
     mesh = problem.mesh
     edges = np.concatenate([mesh.edges / 2, 0.5 + mesh.edges[1:] / 2])
-    if problem.halved:  # the whole orbit is an orbit of one period without the symmetry's help
-        raise InputError("a doubled orbit starts from the orbit on its whole period: build it without symmetry")
     multiple = problem.multiple if mesh.own else 2 * problem.multiple
     new = dataclasses.replace(
         problem, multiple=multiple, intervals=2 * problem.intervals, edges=edges, winding=2 * problem.winding,
-        symmetry=None, period_scale=2 * problem.period_scale if mesh.own else 1.0, _memo={},
+        mirror=None, symmetry=None, period_scale=2 * problem.period_scale if mesh.own else 1.0, _memo={},
     )  # fmt: skip
     nodes, stages, rest = mesh.split(u)
     shifted = np.tile(problem.winding, mesh.degree)
@@ -156,7 +154,8 @@ def _from_rest(problem: OrbitDiscretisation, params: Array) -> Array:
 def _from_transients(problem: OrbitDiscretisation, params: Array, state: Array) -> Array:
     from ..integration.transients import settled_orbit
 
-    times, states, period = settled_orbit(problem.system, params, state, problem.multiple, problem.winding, _TRANSIENTS)
+    turns = problem.whole_winding
+    times, states, period = settled_orbit(problem.system, params, state, problem.multiple, turns, _TRANSIENTS)
     interpolant = _periodic_cubic(times, states)
     return _settled(problem, from_function(problem, interpolant, period), params, f"transients from {state.tolist()}")
 

@@ -95,6 +95,11 @@ class OrbitDiscretisation:
         """Place of a parameter in p."""
         return self.flow.place(name)
 
+    @property
+    def whole_winding(self) -> Array:
+        """x(P) - x(0) of the whole orbit (n,), also where half of it is solved."""
+        return np.asarray(self.winding)
+
     def orbit_period(self, params: Array) -> float:
         """Period of a forced system's orbits."""
         return float(self.multiple * self.evaluations.period(params))

@@ -127,6 +127,8 @@ class PeriodicOrbit:
     verdict : Verdict
     error : float, estimated largest state error over the state's scale;  residual : float
     winding : (n,) float, x(T) - x(0)
+    half_multipliers : (k,) complex or None, of the half-period map S^-1 Phi(T/2) of an orbit x(t + T/2) = S x(t) that
+        was solved on half of its period; their squares are `multipliers`
 
     Examples
     --------
@@ -145,6 +147,7 @@ class PeriodicOrbit:
     error: float = 0.0
     residual: float = 0.0
     winding: NDArray[np.float64] | None = None
+    half_multipliers: NDArray[np.complex128] | None = None
 
     def __post_init__(self) -> None:
         states = tuple(self.states)
@@ -160,6 +163,8 @@ class PeriodicOrbit:
         object.__setattr__(self, "multipliers", frozen(self.multipliers, complex))
         object.__setattr__(self, "verdict", Verdict(self.verdict))
         object.__setattr__(self, "winding", frozen(winding))
+        if self.half_multipliers is not None:
+            object.__setattr__(self, "half_multipliers", frozen(self.half_multipliers, complex))
 
     @classmethod
     def from_nodes(
@@ -309,6 +314,8 @@ class PeriodicOrbit:
             "residual": float(self.residual),
         }
         arrays = {"edges": self.edges, "coefficients": self.coefficients, "multipliers": self.multipliers}
+        if self.half_multipliers is not None:
+            arrays["half_multipliers"] = self.half_multipliers
         return header, {**arrays, "winding": np.asarray(self.winding)}
 
     @classmethod
@@ -316,4 +323,4 @@ class PeriodicOrbit:
         """The inverse of `to_storage`."""
         fields: dict[str, Any] = {k: header[k] for k in ("states", "params", "verdict", "error", "residual")}
         fields |= {k: arrays[k] for k in ("edges", "coefficients", "multipliers", "winding")}
-        return cls(**fields)
+        return cls(**fields, half_multipliers=arrays.get("half_multipliers"))
