@@ -61,6 +61,8 @@ _EXPORTS: dict[str, str] = {
     "Table": "systems.tables",
     "Verdict": "words",
     "compare": "comparing.overlay",
+    "responses": "comparing.responding",
+    "Responses": "results.responses",
     "Comparison": "results.comparison",
     "dimensionless": "systems.scaling",
     "linearised": "systems.linearising",

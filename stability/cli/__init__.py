@@ -30,6 +30,7 @@ COMMANDS: dict[str, str] = {
     "doctor": "Which 'stability' is imported, versions, back ends, caches.",
     "models": "List the catalogue, or describe one model.",
     "new": "Write a commented template of a model as text.",
+    "response": "A response by several methods on one axes, with folds and errors side by side.",
     "simulate": "Motion in time from given initial values.",
     "sweep": "Response along a slow sweep, as on a shaker.",
     "plot": "Draw a stored chart, branch or orbit.",

@@ -46,13 +46,16 @@ class _Order(click.ParamType):
         return name, order
 
 
+RATIO, ORDER = _Ratio(), _Order()
+
+
 @click.command("average")
 @click.argument("model")
 @click.option("--set", "pairs", type=SETTING, multiple=True, help="A parameter or an option of the model; repeatable.")
-@click.option("--resonance", type=_Ratio(), help="Excitation : response of the slowest coordinate, such as 2:1.")
+@click.option("--resonance", type=RATIO, help="Excitation : response of the slowest coordinate, such as 2:1.")
 @click.option("--order", type=click.IntRange(1, 2), default=1, show_default=True, help="Order of the small parameter.")
 @click.option("--variables", type=click.Choice(["cartesian", "polar"]), help="Slow states; by default cartesian.")
-@click.option("--small", type=_Order(), multiple=True, help="What is small, as name or name=order; repeatable.")
+@click.option("--small", type=ORDER, multiple=True, help="What is small, as name or name=order; repeatable.")
 @click.option("--method", type=click.Choice(["averaging", "multiple-scales"]), default="averaging", show_default=True)
 @click.option("--latex", is_flag=True, help="Equations in LaTeX.")
 @as_json_option

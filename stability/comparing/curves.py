@@ -2,12 +2,14 @@
 
 A method may need several branches (detached ones, those born at a branch point): they count together. The quantity is
 a column, ``<coordinate>.amplitude(1)``, ``<state>.max``, ...; the slow flow of `averaging` carries its amplitude as
-``<coordinate>_amplitude``, and its extrema are those of the motion that it stands for (`reconstruct`).
+``<coordinate>_amplitude``, and its extrema are those of the motion that it stands for (`reconstruct`). States of a slow
+flow that are the same motion at another time (of a p:q resonance there are p) count once.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -18,6 +20,7 @@ from numpy.typing import NDArray
 from ..analytic.reconstructing import steady_extrema
 from ..errors import InputError, unknown_name
 from ..results.branch import Branch
+from ..results.comparison import distinct
 from ..results.sweep import Sweep
 from ..words import Kind, Verdict
 
@@ -52,8 +55,8 @@ class Curves:
 
     @property
     def folds(self) -> list[float]:
-        """Parameter values of the folds, ascending."""
-        return sorted(p.params[b.name] for b in self.branches for p in b.of_kind(Kind.FOLD))
+        """Parameter values of the folds, ascending; those of mirror images, at one place, once."""
+        return distinct([p.params[b.name] for b in self.branches for p in b.of_kind(Kind.FOLD)])
 
     def rows(self, value: float) -> list[tuple[Verdict, float]]:
         """(verdict, quantity) of every solution at a value of the parameter: solved, not interpolated."""
@@ -61,7 +64,7 @@ class Curves:
             found = []
             for branch in self.branches:
                 column = _own_column(branch, self.quantity)
-                rows = branch.rows_at(**{branch.name: value})
+                rows = _motions(branch.rows_at(**{branch.name: value}), _slow(branch) is not None)
                 if column is not None:
                     found += [(row["verdict"], float(row[column])) for row in rows]
                 elif rows:
@@ -90,6 +93,23 @@ class Curves:
         return tuple(shown)
 
 
+def _motions(rows: Sequence[dict[str, Any]], slow: bool) -> list[dict[str, Any]]:
+    """The rows of different motions: states of a slow flow with equal amplitudes are one, shifted in time."""
+    if not slow:
+        return list(rows)
+
+    def same(one: dict[str, Any], other: dict[str, Any]) -> bool:
+        names = [name for name in one if name.endswith("_amplitude")]
+        alike = all(math.isclose(one[name], other[name], rel_tol=1e-7) for name in names)
+        return bool(names) and alike and one["verdict"] is other["verdict"]
+
+    kept: list[dict[str, Any]] = []
+    for row in rows:
+        if not any(same(row, other) for other in kept):
+            kept.append(row)
+    return kept
+
+
 def default_quantity(branch: Branch) -> str:
     """The fundamental amplitude of the first coordinate."""
     for name in branch.columns:
@@ -111,18 +131,19 @@ def _slow(branch: Branch) -> Any:
 
 def _own_column(branch: Branch, quantity: str) -> str | None:
     """The branch's own name of the quantity; None where it has to be read off the reconstructed motion."""
-    if quantity in branch.columns:
+    slow = _slow(branch)
+    columns = branch.columns if slow is None else (*slow.states, *slow.outputs)  # what it has of itself, unaided
+    if quantity in columns:
         return quantity
     stem, _, measure = quantity.rpartition(".")
     if measure == "amplitude(1)" or quantity.endswith("_amplitude"):
         bare = stem or quantity.removesuffix("_amplitude")
         for alias in (f"{bare}_amplitude", f"{bare}.amplitude(1)"):
-            if alias in branch.columns:
+            if alias in columns:
                 return alias
-    slow = _slow(branch)
     if slow is not None and stem in slow.reconstruction and measure in ("max", "min"):
         return None
-    raise unknown_name("column", quantity, branch.columns, "a compared branch")
+    raise unknown_name("column", quantity, columns, "a compared branch")
 
 
 def _reconstructed(branch: Branch, states: Array, at: Array, quantity: str) -> Array:

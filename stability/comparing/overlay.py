@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..results.branch import Branch
-from ..results.comparison import Comparison, Difference
+from ..results.comparison import Comparison, Difference, swept
 from ..results.sweep import Sweep
 from ..words import Verdict
 from .curves import Curves, default_quantity, described, unique
@@ -130,11 +130,7 @@ def _branch_difference(name: str, base: Curves, other: Curves, points: int) -> D
 
 
 def _sweep_difference(name: str, base: Curves, sweep: Sweep) -> Difference:
-    stem, _, measure = base.quantity.rpartition(".")
-    sources = {"amplitude(1)": sweep.amplitude(1), "max": sweep.maximum, "min": sweep.minimum}
-    if measure not in sources:
-        raise InputError(f"a sweep has no {base.quantity}: compare <state>.amplitude(1), <state>.max or <state>.min")
-    values, (low, high) = sources[measure][stem], base.bounds
+    values, (low, high) = swept(sweep, base.quantity), base.bounds
     matches: list[tuple[float, float, float, Verdict]] = []
     extra: list[tuple[float, Verdict, float]] = []
     for value, seen, settled in zip(sweep.parameter.tolist(), values.tolist(), sweep.settled):

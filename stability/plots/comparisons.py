@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ..results.comparison import swept
 from ..results.sweep import Sweep
 from .branches import plot_branch
 from .style import COLOURS, SERIES, axis_label
@@ -33,10 +34,10 @@ def plot_comparison(comparison: Comparison, ax: Any = None) -> list[Any]:
         _, ax = plt.subplots(layout="constrained")
     stem, _, measure = comparison.quantity.rpartition(".")
     artists = []
-    colours = [c for c in SERIES if c != COLOURS["black"]]
+    colours = [c for c in SERIES if c not in (COLOURS["black"], COLOURS["grey"])]
     for k, (name, curve) in enumerate(zip(comparison.names, comparison.curves)):
         if isinstance(curve, Sweep):
-            values = curve.amplitude(1)[stem] if measure == "amplitude(1)" else curve.maximum[stem]
+            values = swept(curve, comparison.quantity)
             lo, hi = curve.window
             marker = ">" if hi > lo else "<"
             artists += ax.plot(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
@@ -9,14 +10,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from ..words import Verdict
 from .solutions import frozen
+from .storage import register
+from .sweep import Sweep
 
-__all__ = ["Comparison", "Difference"]
+__all__ = ["Comparison", "Difference", "distinct", "swept"]
 
 Array = NDArray[np.float64]
 
 
+def distinct(places: list[float]) -> list[float]:
+    """Ascending, places closer than 1e-9 of the largest once (mirror images have their special points at one place)."""
+    found: list[float] = []
+    for place in sorted(places):
+        if not found or place - found[-1] > 1e-9 * max(abs(p) for p in places):
+            found.append(place)
+    return found
+
+
+def swept(sweep: Sweep, quantity: str) -> Array:
+    """(N,) a quantity of branches, such as u.amplitude(1) or u.max, along a sweep."""
+    stem, _, measure = quantity.rpartition(".")
+    sources = {"amplitude(1)": sweep.amplitude(1), "max": sweep.maximum, "min": sweep.minimum, "mean": sweep.mean}
+    if measure not in sources:
+        raise InputError(f"a sweep has no {quantity}: it has {', '.join(f'<state>.{m}' for m in sources)}")
+    return sources[measure][stem]
+
+
+@register("difference")
 @dataclass(frozen=True, eq=False, repr=False)
 class Difference:
     """One method against the reference.
@@ -54,6 +77,25 @@ class Difference:
     def worst(self) -> float:
         """Largest modulus of `errors`; 0 where nothing was matched."""
         return float(np.abs(self.errors).max(initial=0.0))
+
+    def to_storage(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """Header and arrays for `results.storage.write`."""
+        header = {
+            "name": self.name,
+            "verdicts": [str(v) for v in self.verdicts],
+            "missing": [[p, str(v), q] for p, v, q in self.missing],
+            "extra": [[p, str(v), q] for p, v, q in self.extra],
+            "folds": [list(pair) for pair in self.folds],
+        }
+        return header, {key: getattr(self, key) for key in ("parameter", "reference", "value")}
+
+    @classmethod
+    def from_storage(cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Difference:
+        """The inverse of `to_storage`."""
+        rows = {key: tuple((p, Verdict(v), q) for p, v, q in header[key]) for key in ("missing", "extra")}
+        verdicts = tuple(Verdict(v) for v in header["verdicts"])
+        folds = tuple((a, b) for a, b in header["folds"])
+        return cls(name=header["name"], verdicts=verdicts, folds=folds, **rows, **arrays)
 
     def __repr__(self) -> str:
         median = float(np.median(np.abs(self.errors))) if self.errors.size else np.nan

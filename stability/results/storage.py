@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileFormatError, InputError
 
-__all__ = ["load", "read", "register", "write"]
+__all__ = ["class_of", "load", "read", "register", "schema_of", "write"]
 
 _VERSION = 1
 _HEADER = "__header__"
@@ -40,6 +40,8 @@ _HOMES = {
     "trajectory": "results.trajectory",
     "sweep": "results.sweep",
     "basins": "results.basins",
+    "difference": "results.comparison",
+    "responses": "results.responses",
 }
 T = TypeVar("T", bound=type)
 
@@ -52,6 +54,20 @@ def register(schema: str) -> Callable[[T], T]:
         return cls
 
     return decorate
+
+
+def class_of(schema: str) -> Any:
+    """The class that reads a schema; its module is imported on demand."""
+    if schema not in _CLASSES and schema in _HOMES:
+        import_module(f"stability.{_HOMES[schema]}")
+    if schema not in _CLASSES:
+        raise FileFormatError(f"it holds a '{schema}', which this version does not know")
+    return _CLASSES[schema]
+
+
+def schema_of(result: Any) -> str:
+    """The schema of a result's class."""
+    return next(schema for schema, cls in _CLASSES.items() if cls is type(result))
 
 
 def _plain(value: Any) -> Any:
@@ -160,11 +176,9 @@ def load(path: str | os.PathLike[str]) -> Any:
     (10, 20)
     """
     schema, header, arrays = read(path)
-    if schema not in _CLASSES and schema in _HOMES:
-        import_module(f"stability.{_HOMES[schema]}")
-    if schema not in _CLASSES:
-        raise FileFormatError(f"'{os.fspath(path)}' holds a '{schema}', which this version does not know")
     try:
-        return _CLASSES[schema].from_storage(header, arrays)  # type: ignore[attr-defined]
+        return class_of(schema).from_storage(header, arrays)
+    except FileFormatError as trouble:
+        raise FileFormatError(f"'{os.fspath(path)}': {trouble}") from trouble
     except (KeyError, TypeError, IndexError, ValueError) as trouble:
         raise FileFormatError(f"'{os.fspath(path)}' is damaged: {type(trouble).__name__}: {trouble}") from trouble
