@@ -100,10 +100,10 @@ def _residual(tables, layout, work, c, omega, rate, index):  # type: ignore[no-u
 
 @kernel(inline=True)
 def _is_constant(J, row, state):  # type: ignore[no-untyped-def]
+    same = True
     for i in range(1, J.shape[0]):
-        if J[i, row, state] != J[0, row, state]:
-            return False
-    return True
+        same = same and J[i, row, state] == J[0, row, state]
+    return same
 
 
 @kernel(inline=True)

@@ -82,8 +82,8 @@ def _length(weights, x):  # type: ignore[no-untyped-def]
 
 @kernel
 def newton(  # type: ignore[no-untyped-def]
-    solver, field, period, multiple, phase, tables, layout, work, P, index, u, weights, row_sizes, t, t_l, weight_l, arc,
-    ds, tolerance, settled, most, full, pivots, x,
+    solver, field, period, multiple, phase, tables, layout, work, P, index, u, weights, row_sizes, t, t_l, weight_l,
+    arc, ds, tolerance, settled, most, full, pivots, x,
 ):  # fmt: skip
     """Correct u and, with a tangent (`arc` 1), P[index], both in place; at most `most` steps (0: only fill `work`).
 
@@ -118,7 +118,7 @@ def newton(  # type: ignore[no-untyped-def]
         residual = _largest(R, row_sizes, gap)
         if not residual < np.inf:
             status = NOT_FINITE
-        if status == CONVERGED or status == NOT_FINITE or iterations >= most:
+        if status in (CONVERGED, NOT_FINITE) or iterations >= most:
             break
         iterations += 1
         for i in range(inner):

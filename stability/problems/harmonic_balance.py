@@ -45,6 +45,7 @@ _DENSE_DEGREE = 9
 _SETTLED = 1e-12  # multipliers belong to the point itself, not to the last iterate
 _NOTES = {NO_CONVERGENCE: "no convergence", SINGULAR: "singular", NEGATIVE_PERIOD: "the period became negative"}
 _MAX_HARMONICS, _MAX_SAMPLES = 1000, 65536
+_FIRST, _MOST = 7, 127  # harmonics to begin with where none are given; those that adaption goes to
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,21 +55,24 @@ class HarmonicBalance(OrbitDiscretisation):
     Parameters
     ----------
     system : System
-    harmonics : int
-        Harmonics H >= 1 of the orbit's own period (with subharmonic k: harmonic k is the forcing).
+    harmonics : int, optional
+        Harmonics H >= 1 of the orbit's own period (with subharmonic k: harmonic k is the forcing). None: as many as
+        the motion needs, beginning with 7 k.
     subharmonic : int
         Orbits of k forcing periods. Autonomous systems have no forcing: leave it at 1.
     samples : int, optional
         Samples per period N >= 4 H + 4. None: exact for polynomials, and grown by measured aliasing for other terms.
-    adaptive : bool
+    adaptive : bool, optional
         True: harmonics grow and drop so that the estimated error stays below `accuracy`, never below `harmonics`.
-        False: H stays; where the estimated error exceeds `accuracy` a TruncationWarning says how many are missing.
+        False: H stays; where the estimated error exceeds `accuracy` a TruncationWarning says how many are missing. By
+        default True where no number of harmonics is given, else False.
     accuracy : float
         Wanted error of the states over their scales; None: 1e-8 where adaptive, else 1e-3.
     winding : mapping of angle -> whole number of turns per orbit, or array (n,) in radians
     scales, period_scale : sizes of the states (n,) and of the period; by default 1, then set by `adapt`.
-    fewest : int, optional
-        Harmonics below which adaption does not go; by default `harmonics`.
+    fewest, most : int, optional
+        Harmonics between which adaption stays; by default `harmonics`, and 127 (or `harmonics`). At `most` a
+        TruncationWarning says what is missing: terms with a kink (abs, max) may ask for more than is sensible.
 
     Raises
     ------
@@ -90,23 +94,26 @@ class HarmonicBalance(OrbitDiscretisation):
     """
 
     system: Any
-    harmonics: int = 7
+    harmonics: Any = None
     subharmonic: int = 1
     samples: Any = None
-    adaptive: bool = False
+    adaptive: Any = None
     accuracy: Any = None
     winding: Any = None
     scales: Any = None
     period_scale: float = 1.0
     fewest: Any = None
+    most: Any = None
     _memo: dict[str, Any] = field(default_factory=dict, repr=False)
     _warned: set[str] = field(default_factory=set, repr=False)
 
     def __post_init__(self) -> None:
         refuse_stops(self.system, "HarmonicBalance")
         n = self.system.n
-        for name, high in (("harmonics", _MAX_HARMONICS), ("subharmonic", 64)):
-            object.__setattr__(self, name, whole_number(name, getattr(self, name), 1, high))
+        object.__setattr__(self, "subharmonic", whole_number("subharmonic", self.subharmonic, 1, 64))
+        object.__setattr__(self, "adaptive", self.harmonics is None if self.adaptive is None else bool(self.adaptive))
+        harmonics = _FIRST * self.subharmonic if self.harmonics is None else self.harmonics
+        object.__setattr__(self, "harmonics", whole_number("harmonics", harmonics, 1, _MAX_HARMONICS))
         if self.own and self.subharmonic != 1:
             raise InputError(
                 f"subharmonic = {self.subharmonic}: '{self.system.name}' is autonomous and has no forcing period to be "
@@ -114,6 +121,8 @@ class HarmonicBalance(OrbitDiscretisation):
             )
         fewest = self.harmonics if self.fewest is None else whole_number("fewest", self.fewest, 1, self.harmonics)
         object.__setattr__(self, "fewest", fewest)
+        most = max(_MOST, self.harmonics) if self.most is None else self.most
+        object.__setattr__(self, "most", whole_number("most", most, self.harmonics, _MAX_HARMONICS))
         accuracy = (1e-8 if self.adaptive else 1e-3) if self.accuracy is None else self.accuracy
         if not (isinstance(accuracy, (int, float)) and 0 < accuracy < 1):
             raise InputError(f"accuracy = {self.accuracy!r}: a number between 0 and 1 is needed (1e-8, for example)")
@@ -224,6 +233,7 @@ class HarmonicBalance(OrbitDiscretisation):
             "scales": self.scales.tolist(),
             "period_scale": self.period_scale,
             "fewest": self.fewest,
+            "most": self.most,
         }
         if self.system.function is not None:
             return {**own, "view_only": True}

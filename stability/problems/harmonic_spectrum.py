@@ -48,7 +48,7 @@ __all__ = ["HillModes", "Propagation", "checked_spectrum", "hill_modes", "indepe
 Array = np.ndarray
 _DEGREE = 5
 _BOUND = 1e-8
-_LOOSE, _SHARE = 1e-5, 1e-2  # a larger bound will do where no verdict depends on it: of multipliers' distances to the circle
+_LOOSE, _SHARE = 1e-5, 1e-2  # a larger bound will do where it is a small share of all distances to the unit circle
 _WHOLE = 140  # order of the largest Hill matrix that is solved whole at an ordinary point
 _FARTHEST = 30.0  # of exponents times T: beyond it a quotient belongs to another mode
 _SMALL = 0.3
@@ -130,7 +130,7 @@ class Propagation(NamedTuple):
 
 @lru_cache(maxsize=64)
 def _points(harmonics: int, multiple: int) -> tuple[tuple[Array, ...], Array]:
-    """(points of the collocation, phases, G and G D of K harmonics, widths) and the analysis of the intervals' starts."""
+    """(points of the collocation, phases, G and G D of K harmonics, widths) and the analysis of their starts."""
     S = max(16, 2 * harmonics + 2)
     s = ((np.arange(S)[:, None] + gauss_rule(_DEGREE).points) / S).ravel()
     G = series(2 * harmonics + 1, s)

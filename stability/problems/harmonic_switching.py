@@ -23,7 +23,8 @@ Array = np.ndarray
 
 def doubled_problem(problem: HarmonicBalance, u: Array, params: Array) -> tuple[HarmonicBalance, Array, Array]:
     """(problem with 2H harmonics on twice the period, its u = the orbit twice, the antiperiodic direction)."""
-    fields = {"harmonics": 2 * problem.harmonics, "fewest": 2 * problem.fewest, "winding": 2 * problem.winding}
+    fields = {"harmonics": 2 * problem.harmonics, "fewest": 2 * problem.fewest, "most": min(2 * problem.most, 1000)}
+    fields["winding"] = 2 * problem.winding
     if problem.own:
         fields["period_scale"] = 2 * problem.period_scale
     else:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["Correction", "adapted", "correction", "missing_harmonics"]
 
 Array = np.ndarray
-_MOST = 63  # harmonics that adaption goes to by itself
+_MODERATE = 63  # harmonics that adaption grows to before it believes that the decay is a slow one
 _FAR = 1000  # largest number of missing harmonics that is extrapolated to
 _MOST_SAMPLES = 32  # per harmonic
 _ALIAS = 0.1  # largest share of aliasing in the error that is left alone
@@ -171,7 +171,7 @@ def adapted(
         fields["harmonics"] = harmonics
     elif not problem.fixed_samples and found.aliasing > max(_ALIAS * found.error, _ROUNDING):
         fields |= {"samples": 2 * problem.samples} if problem.samples < _MOST_SAMPLES * harmonics else {}
-    if not problem.adaptive or harmonics >= _MOST:
+    if not problem.adaptive or harmonics == problem.harmonics:
         warn_of_truncation(problem, replace(found, error=worst), params)
     if not fields:
         return None
@@ -188,7 +188,10 @@ def _carried(old: HarmonicBalance, new: HarmonicBalance, u: Array) -> Array:
 def _wanted_harmonics(problem: HarmonicBalance, found: Correction) -> int:
     H, accuracy = problem.harmonics, problem.accuracy
     if found.error > accuracy:
-        return min(max(_MOST, problem.fewest), H + min(max(missing_harmonics(found, 0.3 * accuracy), 1), max(H, 2)))
+        more = max(missing_harmonics(found, 0.3 * accuracy), 1)
+        # where the decay says that even `most` will not do (a kink), a moderate number is as good
+        highest = problem.most if H + more <= problem.most else min(problem.most, max(_MODERATE, H))
+        return min(highest, H + min(more, max(H, 2)))
     tail = np.cumsum(found.sizes[::-1])[::-1]  # tail[k]: harmonics above k
     enough = int(np.argmax(np.append(tail, 0.0) < 1e-2 * accuracy))
     lower = max(enough, problem.fewest, math.ceil(2 * H / 3), 1)
@@ -202,9 +205,12 @@ def warn_of_truncation(problem: HarmonicBalance, found: Correction, params: Arra
     problem._warned.add("truncation")
     more = missing_harmonics(found, problem.accuracy)
     where = ", ".join(f"{k} = {v:.6g}" for k, v in zip(problem.parameters, params.tolist()))
+    remedy = f"harmonics={problem.harmonics + more}, or adaptive=True"
+    if problem.adaptive:
+        remedy = "a term with a kink converges slowly: Collocation is its method; or give harmonics= and a larger most="
     warnings.warn(
         f"{problem.harmonics} harmonics are too few for '{problem.system.name}' at {where}: estimated error "
         f"{found.error:.1e} of the states' scales, wanted {problem.accuracy:.0e}; about {more} more are missing "
-        f"(harmonics={problem.harmonics + more}, or adaptive=True)",
+        f"({remedy})",
         TruncationWarning, stacklevel=3,
     )  # fmt: skip
