@@ -49,6 +49,7 @@ METHODS = ("averaging", "averaging2", "multiple-scales", "multiple-scales2", "hb
 _SLOW = {"averaging": (averaging, 1), "averaging2": (averaging, 2), "multiple-scales": (multiple_scales, 1),
          "multiple-scales2": (multiple_scales, 2)}  # fmt: skip
 _USUAL = ("averaging", "hb3", "hb9", "collocation", "sweep")
+_SMOOTH = 0.08  # longest step of a branch, so that it is a smooth curve in a picture
 _NEAR = 1e-6  # of the window: two special points are one
 
 
@@ -181,7 +182,7 @@ def _branches(
     making: Callable[[], Any], parameter: str, window: tuple[float, float], born: bool
 ) -> tuple[Branch, ...]:
     """Branches from both ends, and those that are born on them."""
-    found = families(making(), parameter, window, places=0)
+    found = families(making(), parameter, window, places=0, ds_max=_SMOOTH)
     children: list[Branch] = []
     if not born:
         return found
@@ -191,7 +192,7 @@ def _branches(
             known = [p.params[parameter] for child in children for p in child.special if p.kind is Kind.BRANCH_POINT]
             place = point.params[parameter]
             if point.kind in (Kind.BRANCH_POINT, Kind.PERIOD_DOUBLING) and all(abs(k - place) > near for k in known):
-                children.append(continuation(switch(point), parameter, window))
+                children.append(continuation(switch(point), parameter, window, ds_max=_SMOOTH))
     return (*found, *children)
 
 
