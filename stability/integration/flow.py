@@ -188,7 +188,9 @@ def _clock(compiled: CompiledField, params: Array, which: list[int]) -> tuple[fl
 def _failure(system: Any, status: int, t: float, x: Array, steps: int) -> Exception:
     state = ", ".join(f"{name} = {value:.4g}" for name, value in zip(system.states, x))
     if status == runge_kutta.NOT_FINITE:
-        return NonFiniteError(f"the solution of '{system.name}' is no longer finite at t = {t:.6g}; last state {state}")
+        why = CompiledField.of(system).evaluations.failure(keep=True)
+        sentence = f"the solution of '{system.name}' is no longer finite at t = {t:.6g}; last state {state}{why}"
+        return NonFiniteError(sentence)
     what = "needs too many steps" if status == runge_kutta.TOO_MANY_STEPS else "needs a step below rounding"
     return ConvergenceError(
         f"the integration of '{system.name}' {what} at t = {t:.6g}, {state}; loosen rtol and atol, or look for a jump "

@@ -332,12 +332,12 @@ class Collocation(OrbitDiscretisation):
         return Corrected(u, params, new, float(residual), iterations, int(sign), linearisation, True)
 
     def _not_finite(self, mesh: OrbitMesh, work: Workspace) -> str:
-        bad = np.argwhere(~np.isfinite(work.F))
+        bad, why = np.argwhere(~np.isfinite(work.F)), self.evaluations.failure()
         if not len(bad):
-            return "not finite: a derivative or the solution"
+            return f"not finite: a derivative or the solution{why}"
         point, state = bad[0]
         where = mesh.phase[point] if not mesh.own else mesh.points.ravel()[point]
-        return f"not finite: state {self.system.states[state]} at phase {where:.3g}"
+        return f"not finite: state {self.system.states[state]} at phase {where:.3g}{why}"
 
     def linearise(self, u: Array, params: Array) -> CollocationLinearisation:
         """The linearisation at (u, params)."""

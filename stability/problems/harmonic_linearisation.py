@@ -92,12 +92,12 @@ class HarmonicLinearisation:
     @property
     def complaint(self) -> str:
         """Which state is not finite, and where."""
-        bad = np.argwhere(~np.isfinite(self.F))
+        bad, why = np.argwhere(~np.isfinite(self.F)), self.problem.evaluations.failure()
         if not len(bad):
-            return "not finite: a derivative or the solution"
+            return f"not finite: a derivative or the solution{why}"
         point, state = bad[0]
         where = self.problem.layout.basis.points[point]
-        return f"not finite: state {self.problem.system.states[state]} at phase {where:.3g}"
+        return f"not finite: state {self.problem.system.states[state]} at phase {where:.3g}{why}"
 
     @cached_property
     def phase_row(self) -> Array:

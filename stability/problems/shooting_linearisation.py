@@ -86,10 +86,10 @@ class ShootingLinearisation:
     @property
     def complaint(self) -> str:
         """Where the flow is not finite."""
-        bad = np.argwhere(~np.isfinite(self.parts.ends))
+        bad, why = np.argwhere(~np.isfinite(self.parts.ends)), self.problem.evaluations.failure()
         if not len(bad):
-            return "not finite"
-        return f"not finite: state {self.problem.system.states[bad[0][1]]} in segment {bad[0][0]}"
+            return f"not finite{why}"
+        return f"not finite: state {self.problem.system.states[bad[0][1]]} in segment {bad[0][0]}{why}"
 
     @cached_property
     def matrix(self) -> Array:

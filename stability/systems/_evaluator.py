@@ -44,7 +44,7 @@ class Evaluator:
     backend : "llvm", "lambdify" or "function"
     states, parameters, output_names : tuples of str
         What the columns of X, P and of `outputs` are.
-    callback_error : Exception or None
+    callback_error : exception or None
         The last error of a Python back end behind `address` (its outputs were filled with NaN).
     """
 
@@ -59,7 +59,7 @@ class Evaluator:
         self._lock = threading.RLock()
         self._codes: dict[str, Any] = {}
         self._callbacks: dict[str, Any] = {}
-        self.callback_error: Exception | None = None
+        self.callback_error: BaseException | None = None
 
     # ------------------------------------------------------------------ values and derivatives
 
@@ -199,6 +199,19 @@ class Evaluator:
                 self._callbacks[which] = self._native(which)
             return int(self._callbacks[which][0])
 
+    def failure(self, keep: bool = False) -> str:
+        """What a Python function behind `address` raised last, as the end of a sentence; told once unless kept.
+
+        A keyboard interrupt that fell into the function is raised here.
+        """
+        error = self.callback_error
+        if not keep:
+            self.callback_error = None
+        if isinstance(error, KeyboardInterrupt):
+            self.callback_error = None
+            raise error
+        return "" if error is None else f"; its right-hand side raised {type(error).__name__}: {error}"
+
     def _native(self, which: str) -> tuple[int, Any]:
         """A ctypes callback around `_run`; an exception cannot cross the C border, so it fills the outputs with NaN."""
         kinds = [ctypes.c_int64] + [ctypes.c_void_p] * 3 + [ctypes.c_int64] + [ctypes.c_void_p] * 3
@@ -211,7 +224,7 @@ class Evaluator:
             try:
                 parameters = _view(P, N, m) if stride else _view(P, 1, m)[0]
                 self._run(which, _view(phase, N, 1)[:, 0] if phase else None, _view(X, N, n), parameters, (), outputs)
-            except Exception as error:  # noqa: BLE001 - whatever a user's function raises must not enter C
+            except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - what is raised here must not enter C
                 self.callback_error = error
                 for output in outputs:
                     output[:] = np.nan
