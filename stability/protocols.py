@@ -94,7 +94,7 @@ class Seed(NamedTuple):
     params: Array  # (m,)
     tangent: Array  # (N,) u-part of the direction of the new branch
     parameter: float  # parameter's part of the direction (0 for pitchfork, Hopf and period doubling)
-    sides: int  # 1: the other half is the same solutions shifted in time; 2: both are followed and joined
+    sides: int  # 0: this direction only; 1: the other half is the same shifted in time; 2: both are followed and joined
     kind: Kind  # of the point it is born at
     free: str  # the parameter along which that point was found
     avoid: tuple[Array, float] | None = None  # direction of the old branch: the first step is taken orthogonally to it

@@ -210,6 +210,8 @@ def _restarted(branch: Branch, settings: Settings, end: int) -> Follower | None:
     inside = settings.low < branch.parameter[i] < settings.high
     if resume is None or status is Status.CLOSED_LOOP or (at_wall and not inside):
         return None
+    if branch.marks[i] >= 0 and branch.special[branch.marks[i]].kind is Kind.GRAZING:
+        return None  # beyond it these solutions mean nothing
     sign, inward = (1, -1) if end else (-1, 1)
     # neighbours as the driver met them: accepted points only
     k = i + inward

@@ -52,6 +52,13 @@ class Flow:
             raise InputError("this flow was integrated without dense output: pass dense=True")
         return self._dense[0]
 
+    @property
+    def nested(self) -> Array:
+        """(steps, 8, n) dense output of the steps, see kernels/piecewise.py (only with dense=True)."""
+        if self._dense is None:
+            raise InputError("this flow was integrated without dense output: pass dense=True")
+        return self._dense[1]
+
     def __call__(self, t: Any) -> Array:
         """x(t): (n,) for a number, (n, N) for an array of times inside the interval (only with dense=True)."""
         if self._dense is None:

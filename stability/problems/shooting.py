@@ -25,9 +25,10 @@ import numpy as np
 
 from ..errors import ConvergenceError, InputError, NonFiniteError
 from ..integration.flow import flow
+from ..kernels import piecewise
 from ..kernels.gauss import gauss_rule
 from ..protocols import Corrected, Spectrum, Tangent
-from ..systems.stops import refuse_stops
+from .impact_layout import frozen, started_at_walls
 from .orbit_adaption import natural_sizes, state_scales
 from .orbit_spectrum import contracted, deflated, eigenvalues, orbit_spectrum, spectrum_distance
 from .orbits import OrbitDiscretisation, whole_number, winding_vector
@@ -81,7 +82,6 @@ class Shooting(OrbitDiscretisation):
     _memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
-        refuse_stops(self.system, "Shooting")
         for name, high in (("segments", 1000), ("multiple", 64)):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), 1, high))
         for name in ("rtol", "atol"):
@@ -114,6 +114,15 @@ class Shooting(OrbitDiscretisation):
     def packed(self, values: Array, period: float) -> Array:
         """u from the states at the starts of the segments."""
         return np.append(np.ravel(values), [period] * self.own)
+
+    def sizes(self, period: float) -> Array:
+        """(N,) natural sizes of the unknowns."""
+        return self.packed(np.tile(self.scales, (self.segments, 1)), period)
+
+    @cached_property
+    def row_sizes(self) -> Array:
+        """(N,) natural sizes of the equations."""
+        return np.append(np.tile(self.scales, self.segments), [1.0] * self.own)
 
     @cached_property
     def weights(self) -> Array:
@@ -179,12 +188,22 @@ class Shooting(OrbitDiscretisation):
         rates = self.evaluations.F(phases, ends_, params) * (period / self.segments)
         return Segments(ends_, np.array(matrices), np.array(slopes).reshape(self.segments, n, -1), rates, period)
 
+    def start(self, params: Array, guess: Any = None) -> Array:
+        """A converged u from a guess (see `orbit_starts`), or an error that says which guess to give."""
+        if self.system.stops:
+            found = started_at_walls(self, np.asarray(params, float), guess)
+            if found is not None:
+                return found
+        return super().start(params, guess)
+
     # ------------------------------------------------------------------ the Newton solve
     def linearise(self, u: Array, params: Array) -> ShootingLinearisation:
         """The linearisation at (u, params); not finite where the integration fails."""
-        u, params = np.array(u, float), np.array(params, float)
+        return self._linearised(np.array(u, float), np.array(params, float), 1.0)
+
+    def _linearised(self, u: Array, params: Array, tighter: float) -> ShootingLinearisation:
         try:
-            parts = self.integrate(u, params)
+            parts = self.integrate(u, params, tighter)
         except (ConvergenceError, NonFiniteError):
             parts = Segments.failed(self.segments, self.n, len(params))
         return ShootingLinearisation(self, u, params, parts)
@@ -255,12 +274,7 @@ class Shooting(OrbitDiscretisation):
     def _tighter(self, u: Array, params: Array) -> ShootingLinearisation:
         known = self._memo.get("tighter")
         if known is None or not (np.array_equal(known.u, u) and np.array_equal(known.params, params)):
-            try:
-                parts = self.integrate(u, params, 1e-2)
-            except (ConvergenceError, NonFiniteError):
-                parts = Segments.failed(self.segments, self.n, len(params))
-            known = ShootingLinearisation(self, np.array(u), np.array(params), parts)
-            self._memo["tighter"] = known
+            known = self._memo["tighter"] = self._linearised(np.array(u, float), np.array(params, float), 1e-2)
         return known
 
     def error(self, u: Array, params: Array) -> float:
@@ -268,10 +282,8 @@ class Shooting(OrbitDiscretisation):
         tighter = self._tighter(u, params)
         if not np.isfinite(tighter.residual).all():
             return np.inf
-        scales = self.packed(np.tile(self.scales, (self.segments, 1)), self.period_scale)
-        matrix = tighter.matrix * scales / np.append(np.tile(self.scales, self.segments), [1.0] * self.own)[:, None]
-        right = tighter.residual / np.append(np.tile(self.scales, self.segments), [1.0] * self.own)
-        return float(np.abs(np.linalg.lstsq(matrix, right, rcond=1e-7)[0]).max())
+        matrix = tighter.matrix * self.sizes(self.period_scale) / self.row_sizes[:, None]
+        return float(np.abs(np.linalg.lstsq(matrix, tighter.residual / self.row_sizes, rcond=1e-7)[0]).max())
 
     def spectrum(self, linearisation: Any) -> Spectrum:
         """Multipliers, their error (by a tighter tolerance, and the trivial multiplier), counts, verdict."""
@@ -287,14 +299,16 @@ class Shooting(OrbitDiscretisation):
         values = eigenvalues(M)
         error += spectrum_distance(values, eigenvalues(tighter)) + 1e-15 * float(np.abs(M).max()) * self.n
         J = self.evaluations.FJ(np.zeros(1), linearisation.u[None, : self.n], linearisation.params)[1][0]
-        neutral = self.n == 2 and not self.own and float(np.trace(J)) == 0.0
-        values = contracted(values, linearisation.parts.matrices)
+        elastic = all(stop.restitution == 1.0 for stop in self.system.stops)
+        neutral = self.n == 2 and not self.own and elastic and float(np.trace(J)) == 0.0
+        values = contracted(values, linearisation.factors)
         return orbit_spectrum(values, error, neutral and self.flow.divergence_free(linearisation.params))
 
     def pieces(self, u: Array, params: Array) -> tuple[int, Array, Array, float]:
         """The steps of the integration as polynomials of degree 7."""
         period, n = self.period_of(u, params), self.n
         local = gauss_rule(_DENSE_DEGREE).abscissae
+        basis = np.polynomial.chebyshev.chebvander(2 * local - 1, _DENSE_DEGREE)
         edges, values = [np.zeros(1)], []
         for j in range(self.segments):
             span = (period * j / self.segments, period * (j + 1) / self.segments)
@@ -302,16 +316,22 @@ class Shooting(OrbitDiscretisation):
                 self.system, span, u[j * n : (j + 1) * n], params, rtol=self.rtol, atol=self.atol * self.scales,
                 dense=True,
             )  # fmt: skip
-            times = part.times
-            at = times[:-1, None] + np.diff(times)[:, None] * local
-            values.append(part(at.ravel()).T.reshape(*at.shape, n))
-            edges.append(times[1:] / period)
+            values.append(np.einsum("li,kin->kln", basis, piecewise.from_steps(part.nested)))
+            edges.append(part.times[1:] / period)
         all_edges = np.concatenate(edges)
         all_edges[-1] = 1.0
         return _DENSE_DEGREE, all_edges, np.concatenate(values), period
 
     def adapt(self, u: Array, params: Array, tangent: Tangent | None) -> tuple[Shooting, Array, Any] | None:
-        """New scales where the solution has outgrown the present ones by a factor of 2; else None."""
+        """New scales where the solution has outgrown the present ones by a factor of 2; else None.
+
+        With hard stops the orbit's own sequence of impacts becomes part of the problem (`ImpactShooting`), unless it
+        sticks to a wall.
+        """
+        if self.system.stops:
+            made = frozen(self, u[: self.n], params, self.period_of(u, params))
+            if made is not None:
+                return *made, None if tangent is None else tangent._replace(u=np.zeros(made[0].size))
         period_scale = float(u[-1]) if self.own else 1.0
         smallest = natural_sizes(self.system, period_scale if self.own else self.orbit_period(params))
         scales = state_scales(self.pieces(u, params)[2].reshape(-1, self.n), smallest)

@@ -130,6 +130,11 @@ class ShootingLinearisation:
         return int(np.linalg.slogdet(full)[0])
 
     # ------------------------------------------------------------------ spectral matrix and core
+    @property
+    def factors(self) -> Array:
+        """(K, n, n) matrices whose product is the monodromy matrix."""
+        return self.parts.matrices
+
     @cached_property
     def spectral(self) -> Array:
         """M = D^-1 Phi_{K-1} .. Phi_0 D."""
@@ -200,7 +205,7 @@ class ShootingLinearisation:
 
     def _differences(self, scalar: Any) -> tuple[Array, Array]:
         problem = self.problem
-        sizes_u = problem.packed(np.tile(problem.scales, (self.K, 1)), self.parts.period)
+        sizes_u = problem.sizes(self.parts.period)
         sizes_p = np.maximum(np.abs(self.params), 1e-2)
         gradients = []
         for which, sizes in ((0, sizes_u), (1, sizes_p)):

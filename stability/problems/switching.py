@@ -73,7 +73,7 @@ class Born:
 
 
 def switch(point: SpecialPoint) -> Born:
-    """The problem of the new branch at a branch point, Hopf point or period doubling; give it to `continuation`.
+    """The problem of the new branch at a branch, Hopf, period-doubling or grazing point; give it to `continuation`.
 
     Parameters
     ----------
@@ -84,7 +84,8 @@ def switch(point: SpecialPoint) -> Born:
     -------
     Born
         A branch point gives both halves of the crossing branch, joined; a Hopf point the periodic orbits (by
-        `Collocation`); a period doubling the orbits of twice the period.
+        `Collocation`); a period doubling the orbits of twice the period; a grazing point the orbits with one impact
+        more, or one less.
 
     Raises
     ------
@@ -107,12 +108,14 @@ def switch(point: SpecialPoint) -> Born:
         return _orbits(point)
     if point.kind is Kind.PERIOD_DOUBLING:
         return _doubled(point)
+    if point.kind is Kind.GRAZING:
+        return _beyond_grazing(point)
     advice = {
         Kind.FOLD: "at a fold the branch turns and goes on by itself",
         Kind.NEIMARK_SACKER: "a torus is born there, which is no periodic orbit: simulate it, or follow the Hopf point "
         "of the averaged system",
     }
-    known = "only branch points, Hopf points and period doublings give birth to branches"
+    known = "only branch points, Hopf points, period doublings and grazing points give birth to branches"
     raise InputError(f"{point.label} is a {point.kind} point: {advice.get(point.kind, known)}")
 
 
@@ -197,3 +200,22 @@ def _doubled(point: SpecialPoint) -> Born:
     vector = np.linalg.svd(M + np.eye(M.shape[0]))[2][-1]
     twice, u, tangent = problem.doubled(point.u, params, vector)
     return Born(twice, Seed(twice, u, params, tangent, 0.0, 1, point.kind, point.free))
+
+
+def _beyond_grazing(point: SpecialPoint) -> Born:
+    """One impact more (or less) than on the old branch: the orbits on whose side the new clearance is positive."""
+    params, free = point.params_vector, point.free
+    problem, u = point.problem.beyond(point.u, params)
+    found = problem.correct(u, params, free, None, 0.0, 1e-10)
+    if not found.converged or found.tangent is None:
+        raise InputError(f"{point.label} is degenerate: no orbits with one impact more or less were found beside it")
+    k = list(problem.parameters).index(free)
+    weights, slope = problem.weights, found.tangent.u
+    step = 1e-4 / math.sqrt(float(weights @ slope**2) + 1e-300)
+    clear = []
+    for side in (1.0, -1.0):
+        moved = found.params.copy()
+        moved[k] += side * step
+        clear.append(problem.clearance(found.u + side * step * slope, moved))
+    side = 1.0 if clear[0] > clear[1] else -1.0
+    return Born(problem, Seed(problem, found.u, found.params, side * slope, side, 0, point.kind, free))

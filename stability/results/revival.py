@@ -21,6 +21,7 @@ _PROBLEMS = {
     "Equilibrium": "problems.equilibria",
     "Collocation": "problems.collocation",
     "Shooting": "problems.shooting",
+    "ImpactShooting": "problems.impact_shooting",
     "HarmonicBalance": "problems.harmonic_balance",
     "Backbone": "problems.backbone",
     "Locus": "problems.locus",

@@ -64,6 +64,6 @@ def refuse_stops(system: System, method: str) -> None:
     """InputError where a method would pass through a system's hard stops without seeing them."""
     if system.stops:
         raise InputError(
-            f"{method} does not see the hard stops of '{system.name}' and would pass through them; use simulate or "
-            "sweep, or a model with soft stops (models.soft_stop_oscillator)"
+            f"{method} does not see the hard stops of '{system.name}' and would pass through them; use "
+            "Shooting(system), simulate or sweep, or a model with soft stops (models.soft_stop_oscillator)"
         )

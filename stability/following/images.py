@@ -1,0 +1,54 @@
+r"""The other half of a branch that breaks a symmetry: the image of the first, written down instead of computed.
+
+At a symmetry-breaking pitchfork (problems/orbit_symmetry.py) the two halves of the new branch are images of each other,
+
+    u -> image(u) on the turned mesh,    same parameters, multipliers and events,    tangents mapped like u.
+
+A half that ends at another pitchfork of the same symmetry is followed by its image back to the birth point: a closed
+loop. Any other half gives the branch  image reversed - birth - half.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..protocols import Tangent
+from ..words import Status
+from .follower import Entry, Follower
+from .points import Point
+
+__all__ = ["with_images"]
+
+
+class _Images:
+    """Images of points; one image problem for every problem of the branch."""
+
+    def __init__(self) -> None:
+        self._problems: dict[int, tuple[Any, Any]] = {}
+
+    def entry(self, entry: Entry, s: float) -> Entry:
+        """The image of an entry at arclength s, passed in the direction opposite to its model's."""
+        p = entry.point
+        known = self._problems.setdefault(id(p.problem), (p.problem, None))
+        if known[1] is None:
+            known = self._problems[id(p.problem)] = (p.problem, p.problem.image_problem())  # type: ignore[attr-defined]
+        image = p.problem.image  # type: ignore[attr-defined]
+        t = Tangent(-image(p.tangent.u), -p.tangent.parameter, p.tangent.weight)
+        sign = -p.determinant_sign
+        point: Point = p._replace(problem=known[1], u=image(p.u), tangent=t, s=s, determinant_sign=sign)
+        return Entry(point, None if entry.found is None else entry.found._replace(point=point))
+
+
+def with_images(birth: Entry, half: Follower) -> tuple[list[Entry], Status]:
+    """All entries of the branch, and the status of both of its ends."""
+    status, images = half.status or Status.STEP_TOO_SMALL, _Images()
+    ends_in_pitchfork = status is Status.CLOSED_LOOP and half.entries and half.entries[-1].found is not None
+    if ends_in_pitchfork:
+        end = half.entries[-1].point.s
+        back = [images.entry(e, 2 * end - e.point.s) for e in reversed(half.entries[:-1])]
+        closing = Entry(birth.point._replace(s=2 * end), None)
+        return [birth, *half.entries, *back, closing], status
+    if status is Status.CLOSED_LOOP:  # it has come round by itself
+        return [birth, *half.entries], status
+    front = [images.entry(e, -e.point.s) for e in reversed(half.entries)]
+    return [*front, birth, *half.entries], status

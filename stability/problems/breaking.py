@@ -1,0 +1,73 @@
+r"""Pitchforks of symmetric orbits: which branch points break a symmetry, and the branch that is born there.
+
+On half of a period (orbit_symmetry.py) such a point is a simple multiplier -1 of N. On the whole period it is a +1 with
+two crossing branches: the orbit has a symmetry, x(t + P/2) = S x(t) or x(t) = S x(t), that the new direction turns
+round. The discrete problem has the pitchfork up to its error only, since its mesh is not the same in both halves;
+therefore the point is located again on half of the period, as a -1, and the new branch starts from there.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..protocols import Seed
+from ..words import Kind
+from .collocation import Collocation
+from .defining import locate
+from .orbit_symmetry import Mirror, broken, on_half, turned
+
+__all__ = ["breaks_symmetry", "pitchfork"]
+
+Array = np.ndarray
+
+
+def _crossing(point: Any) -> tuple[Mirror | None, Array, float]:
+    """(symmetry that is lost, the crossing branch's direction and rate) at a branch point of a whole period."""
+    from .switching import null_directions
+
+    problem = point.problem
+    if not isinstance(problem, Collocation) or problem.halved or not problem.system.symmetries:
+        return None, np.zeros(0), 0.0
+    try:
+        u, rate = null_directions(point)[1]
+    except (InputError, np.linalg.LinAlgError):
+        return None, np.zeros(0), 0.0
+    return turned(problem, np.array(point.u), u), u, rate
+
+
+def breaks_symmetry(point: Any) -> bool:
+    """Whether a branch point is a symmetry-breaking pitchfork."""
+    if point.defining_kind is Kind.PERIOD_DOUBLING:
+        return True
+    return _crossing(point)[0] is not None
+
+
+def pitchfork(point: Any) -> Seed | None:
+    """The seed of the branch born at a symmetry-breaking point, followed on one side; None at any other branch point."""
+    params, free = point.params_vector, point.free
+    if point.defining_kind is Kind.PERIOD_DOUBLING:
+        return _seed(point.problem, np.array(point.u), params, free)
+    mirror, u, rate = _crossing(point)
+    if mirror is None:
+        return None
+    if not mirror.fraction:  # the same at every time: the discrete problem has the symmetry, too
+        problem = dataclasses.replace(point.problem, mirror=mirror, _memo={})
+        old = np.array(point.direction), float(point.rate)
+        return Seed(problem, np.array(point.u), params, u, rate, 2, Kind.BRANCH_POINT, free, old, True)
+    half, start = on_half(point.problem, np.array(point.u), mirror.symmetry)
+    spread = abs(point.bracket[1] - point.bracket[0]) or 1e-3 * (abs(point.params[free]) or 1.0)
+    values = np.array([-1.0 + 0j])
+    found = locate(half, Kind.PERIOD_DOUBLING, start, params, free, 1.0 / spread, values, radius=1.0)
+    return _seed(half, found.u, found.params, free) if found.converged else None
+
+
+def _seed(half: Collocation, u: Array, params: Array, free: str) -> Seed:
+    M = half.linearise(u, params).spectral
+    vector = np.linalg.svd(M + np.eye(len(M)))[2][-1]
+    problem, whole, direction = broken(half, u, params, vector)
+    mirrored = problem.mirror is not None
+    return Seed(problem, whole, params, direction, 0.0, 2, Kind.BRANCH_POINT, free, None, mirrored)
