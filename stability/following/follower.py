@@ -5,22 +5,26 @@ iteration. Walls are hard: a step whose prediction or result lies beyond a windo
 end. The mesh is adapted at accepted points only, after the segment behind them has been searched, so that both ends of
 a segment always share a mesh; an adaption that would change the counts (an event within the discretisation error of
 this point) is put off to the next point.
+
+Whatever goes wrong on the way, in a user's function or anywhere else, ends the iteration with a status and a `note`
+that says what it was; points that were accepted are never lost.
 """
 
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError, StabilityWarning
 from ..protocols import Corrected, Tangent
 from ..words import Kind, Status
-from .edges import Edge
 from .events import changes
 from .locating import Found, Locator
 from .loops import Home, collapsed
@@ -43,6 +47,25 @@ def _gap(value: float, point: Point) -> float:
     return point.parameter - value
 
 
+def _value_of(name: str, function: Callable[[Any], float], point: Point) -> float:
+    """A user's event function at a point; what it raises is told whose it is."""
+    solution = point.problem.view(point.u, point.params)
+    try:
+        return float(function(solution))
+    except Exception as error:
+        error.add_note(f"the event '{name}'")
+        raise
+
+
+def _first_value(name: str, function: Callable[[Any], float], point: Point) -> float:
+    """The same at the first point: a function that fails there is a mistake, and no work is lost yet."""
+    try:
+        return _value_of(name, function, point)
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise InputError(f"the event '{name}' failed at the first solution: {reason}") from error
+
+
 class Entry(NamedTuple):
     """A point of the branch; `found` tells what is special about it."""
 
@@ -63,6 +86,7 @@ class Follower(Iterator[Point]):
         self.since_adapt = since_adapt
         self.entries: list[Entry] = []
         self.status: Status | None = None
+        self.note = ""  # why the last step was shortened, or why the iteration ended
         self.interrupted = False
         self.accepted = 0
         self.mirrored = mirrored  # beyond its other end the branch repeats itself, shifted in time
@@ -72,8 +96,8 @@ class Follower(Iterator[Point]):
         self._rate = max(rate, float(np.abs(first.spectrum.values).max(initial=0.0)))
         self._norm = self._norm_of(first)
         self._extent: list[tuple[float, float]] = []
-        self._event_values = [f(first.problem.view(first.u, first.params)) for _, f in settings.events]
-        self._monitor, self._edge = Monitor(first), Edge()
+        self._event_values = [_first_value(name, f, first) for name, f in settings.events]
+        self._monitor = Monitor(first)
         self._seen: dict[str, int] = {}
 
     # ------------------------------------------------------------------ iteration
@@ -84,17 +108,36 @@ class Follower(Iterator[Point]):
         if self.status is not None:
             raise StopIteration
         if len(self.entries) >= self.settings.max_points:
-            self.status = Status.MAX_POINTS
+            self.status, self.note = Status.MAX_POINTS, f"max_points = {self.settings.max_points} reached"
             raise StopIteration
-        step = self._advance()
+        step = None
+        try:
+            step = self._advance()
+            if step is not None:
+                self._take(*step)
+                self._report(step[0])
+        except Exception as error:  # noqa: BLE001 - nothing that is raised on the way may cost the points so far
+            self._broken(error)
         if step is None:
             raise StopIteration
-        point, seen, found = step
-        self._take(point, seen, found)
-        if self.settings.progress is not None:
-            events = sum(e.found is not None for e in self.entries)
+        return step[0]
+
+    def _report(self, point: Point) -> None:
+        if self.settings.progress is None:
+            return
+        events = sum(e.found is not None for e in self.entries)
+        try:
             self.settings.progress(Progress(len(self.entries), point.parameter, self.length, events))
-        return point
+        except Exception as error:
+            error.add_note("the progress function")
+            raise
+
+    def _broken(self, error: Exception) -> None:
+        """End here, saying why, with a warning; the exception's note tells whose function raised it."""
+        who = "".join(f"{note}: " for note in getattr(error, "__notes__", ())[:1])
+        self.status, self.note = Status.STOPPED, f"{who}{type(error).__name__}: {error}"
+        at = f"{self.settings.name} = {self.last.parameter:.10g}"
+        warnings.warn(f"the branch stopped at {at}: {self.note}; its points are kept", StabilityWarning, stacklevel=2)
 
     def run(self) -> Follower:
         """Follow to the end; an interrupt from the keyboard ends the branch and keeps it."""
@@ -102,8 +145,12 @@ class Follower(Iterator[Point]):
             for _ in self:
                 pass
         except KeyboardInterrupt:
-            self.status, self.interrupted = Status.STOPPED, True
+            self.interrupt()
         return self
+
+    def interrupt(self) -> None:
+        """End here, as by a keyboard interrupt."""
+        self.status, self.interrupted, self.note = Status.STOPPED, True, "interrupted"
 
     # ------------------------------------------------------------------ one step
     def _advance(self) -> tuple[Point, Comparison, list[Found]] | None:
@@ -116,20 +163,15 @@ class Follower(Iterator[Point]):
                 continue
             if self._monitor.alone:
                 return *made, []
-            end = self._edge.reached(self.locator, self.before, self.last, made[0])
-            if isinstance(end, float):
-                h *= end
-                continue
-            if end is not None:
-                made = (end[1], made[1])
             found, doubtful = between(self.locator, self.before, self.last, made[0], self._twin)
-            found = [f for f in found if not self._known(f)] + ([end[0]] if end is not None else [])
+            found = [f for f in found if not self._known(f)]
             strange = any(f.kind is Kind.UNEXPLAINED for f in found)
             if not (strange or doubtful) or doubts >= _PATIENCE:
                 return *made, found
             if doubts and not strange and not hopped(self.locator, self.last, made[0]):
                 return *made, found
             # a crossing was foretold and is not there, or one that nothing explains: is this point on another branch?
+            self.note = "stability changes as no bifurcation explains, or another branch is close by"
             doubts += 1
             h = 0.3 * made[1].distance
         self.status = Status.STEP_TOO_SMALL
@@ -144,8 +186,13 @@ class Follower(Iterator[Point]):
             return self._land(wall, h)
         params = last.params.copy()
         params[settings.index] = parameter
-        found = last.problem.correct(u, params, settings.name, last.tangent, 0.0, settings.tolerance)
+        try:
+            found = last.problem.correct(u, params, settings.name, last.tangent, 0.0, settings.tolerance)
+        except Exception as error:  # noqa: BLE001 - a right-hand side that ends somewhere: go nearer to that place
+            self.note = f"{type(error).__name__}: {error}"
+            return 0.4
         if not found.converged or found.tangent is None:
+            self.note = found.note
             return 0.4
         wall = self._wall(float(found.params[settings.index]))
         if wall is not None:
@@ -171,6 +218,7 @@ class Follower(Iterator[Point]):
         params[settings.index] = wall
         found = last.problem.correct(u, params, settings.name, None, 0.0, settings.tolerance)
         if not found.converged or found.tangent is None:
+            self.note = f"at the end of the window: {found.note}"
             return 0.5
         slope, weight, w = found.tangent, settings.weight, last.problem.weights
         size = math.sqrt(dot(w, slope.u, slope.u) + weight**2)
@@ -188,8 +236,10 @@ class Follower(Iterator[Point]):
         seen = compare(last, point, guess, self._rate)
         point = point._replace(s=last.s + seen.distance, step=seen.distance)
         if seen.worst > 1 and not h < KINK * settings.steps.longest:
+            self.note = seen.reason
             return max(0.25, 0.8 / seen.worst)
         if seen.distance > 3 * h or seen.distance == 0:
+            self.note = "Newton's method ends on another curve, or where it began"
             return 0.4
         return point, seen
 
@@ -200,7 +250,11 @@ class Follower(Iterator[Point]):
         if back is not None:
             point = back[0]
             found = [f for f in found if f.point.s <= point.s]
-        found = self._with_wanted(last, point, found)
+        failure: Exception | None = None
+        try:
+            found = self._with_wanted(last, point, found)
+        except Exception as error:  # noqa: BLE001 - the point is sound, whatever a user's function makes of it
+            failure = error
         if self._stops(found):
             return
         at_point = self._value_at(point)
@@ -210,22 +264,24 @@ class Follower(Iterator[Point]):
         self._rate = max(self._rate, float(np.abs(point.spectrum.values).max(initial=0.0)))
         self.length = next_length(seen.distance, seen, last, point, settings.steps)
         if at_point is not None and self._named_stop(at_point):
-            self.status = Status.STOPPED
+            self.status, self.note = Status.STOPPED, "at a value that was to stop it"
         elif back is not None:
             self._close(back[1])
             return
         elif point.parameter in settings.window:
-            self.status = Status.PARAMETER_BOUND
-        elif self._runaway(point):
-            self.status = Status.DIVERGED
+            self.status, self.note = Status.PARAMETER_BOUND, ""
+        elif (grown := self._runaway(point)):
+            self.status, self.note = Status.DIVERGED, grown
         self.before, self.last, self._twin = last, point, None
+        if failure is not None:
+            self._broken(failure)
         self.since_adapt += 1
         if self.since_adapt >= _ADAPT_EVERY and self.status is None:
             self._adapt()
 
     def _close(self, loop: float) -> None:
         """End the branch where it began: what was followed a second time is dropped, the first point closes it."""
-        self.status = Status.CLOSED_LOOP
+        self.status, self.note = Status.CLOSED_LOOP, ""
         first = self.home.marks[0][1]
         end = first.s + loop
         self.entries = [e for e in self.entries if e.point.s < end - 1e-9]
@@ -246,8 +302,9 @@ class Follower(Iterator[Point]):
             if returned:  # the two families cross there
                 one = one._replace(kind=Kind.BRANCH_POINT)
             self.entries.append(Entry(point, one._replace(point=point)))
-            if returned or self._named_stop(one) or one.kind is Kind.GRAZING:
+            if returned or self._named_stop(one):
                 self.status = Status.CLOSED_LOOP if returned else Status.STOPPED
+                self.note = "" if returned else f"at the {one.kind} that was to stop it"
                 self.before, self.last = None, point
                 return True
         if found and found[0].point.s < self.last.s:  # seen late: it belongs before the last point
@@ -259,17 +316,20 @@ class Follower(Iterator[Point]):
         self._seen[prefix] = self._seen.get(prefix, 0) + 1
         return bool({prefix, f"{prefix}{self._seen[prefix]}", found.name} & set(self.settings.stop_at))
 
-    def _runaway(self, point: Point) -> bool:
+    def _runaway(self, point: Point) -> str:
+        """What makes going on senseless, or nothing."""
         size = self._norm_of(point)
         self._extent.append((point.s, point.parameter))
         if not math.isfinite(size) or self._growth * size > _GROWTH * max(1.0, self._norm):
-            return True
+            return f"the solution has grown by more than {_GROWTH:g}"
         # a family that stands still in the parameter: a homoclinic orbit whose period grows, a vertical branch
         recent = self._extent[-_STALL_POINTS:]
         values = [parameter for _, parameter in recent]
         travelled = recent[-1][0] - recent[0][0]
         still = max(values) - min(values) < _STALL / self.settings.weight
-        return len(recent) == _STALL_POINTS and still and travelled > _STALL_LENGTH
+        if len(recent) == _STALL_POINTS and still and travelled > _STALL_LENGTH:
+            return f"the solutions change, but {self.settings.name} stands still at {point.parameter:.10g}"
+        return ""
 
     @staticmethod
     def _norm_of(point: Point) -> float:
@@ -326,8 +386,7 @@ class Follower(Iterator[Point]):
         found = []
         for k, (name, function) in enumerate(self.settings.events):
 
-            def value_of(z: Point, f: Callable[..., float] = function) -> float:
-                return float(f(z.problem.view(z.u, z.params)))
+            value_of = partial(_value_of, name, function)
 
             values = [self._event_values[k], *(value_of(p) for p in knots[1:])]
             self._event_values[k] = values[-1]

@@ -66,7 +66,7 @@ def between(
 def _foretold(before: Point, a: Point, b: Point) -> bool:
     """Whether a real value that came down toward the limit should have passed it before b, or almost, and has not.
 
-    Going on as from `before` to a it changes sign before b; or it is far smaller than a step is let go (`stepping.room`).
+    Going on as from `before` to a it changes sign before b, or it is far smaller than `stepping.room` lets it become.
     A value at a fold vanishes with the parameter's rate: only their ratio tells of a branch point.
     """
     rates = np.abs([[before.tangent.parameter], [a.tangent.parameter], [b.tangent.parameter]])

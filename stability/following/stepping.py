@@ -59,6 +59,17 @@ class Comparison:
         """The largest ratio; above 1 the step is refused."""
         return max(self.angle, self.chord, self.missed, self.motion)
 
+    @property
+    def reason(self) -> str:
+        """Which check the point fails, in words."""
+        sentences = {
+            "the curve turns by too much (a kink, or another curve)": self.angle,
+            "chord and tangents disagree (a crossing or a neighbouring curve)": self.chord,
+            "the corrector goes far from the prediction": self.missed,
+            "multipliers or eigenvalues move by too much": self.motion,
+        }
+        return max(sentences, key=sentences.__getitem__)
+
 
 def predict(last: Point, before: Point | None, h: float) -> tuple[Array, float]:
     """(u, parameter) of the predictor; `before` None, or on another mesh, gives the tangent predictor."""
