@@ -48,6 +48,9 @@ class Kind(StrEnum):
     FOLD_FLIP = "fold-flip"
     GENERALIZED_PERIOD_DOUBLING = "generalized period doubling"
     CHENCINER = "Chenciner"
+    EXTREMUM = "extremum"
+    ISOLA_CENTRE = "isola centre"
+    ISOLA_MERGER = "isola merger"
 
     @property
     def label(self) -> str:
@@ -76,6 +79,9 @@ _LABELS = {
     Kind.FOLD_FLIP: "FF",
     Kind.GENERALIZED_PERIOD_DOUBLING: "GPD",
     Kind.CHENCINER: "CH",
+    Kind.EXTREMUM: "EX",
+    Kind.ISOLA_CENTRE: "IC",
+    Kind.ISOLA_MERGER: "IM",
 }
 
 

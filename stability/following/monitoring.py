@@ -3,11 +3,22 @@ r"""Zeros of functions that a problem itself wants watched: points of codimensio
 A problem may have ``monitors``, a tuple of (kind, function of a point), and ``confirmed(kind, point, scale)``, which
 names a located zero or says that it is none (a pole, a neutral saddle). Zeros are found by Illinois iteration along the
 curve between neighbouring points, as for a user's events, instead of the driver's own events: such a curve has neither
-counts nor defining systems of its own. Problems without monitors cost nothing here.
+counts nor defining systems of its own. Where a function has an ``exact`` companion, that one is used to locate.
+
+``response(point)`` is the answer x (a vector) of the linearised curve to a fixed small change of its equations. It
+grows without bound where the curve branches and comes back from the other side: 1 / (x_a . x) changes sign between a
+and b there, where x_a is the answer at a. Problems without monitors cost nothing here.
 """
 
 from __future__ import annotations
 
+import math
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ..words import Kind
 from .locating import Found, Locator
 from .points import Point
 
@@ -19,6 +30,7 @@ class Monitor:
 
     def __init__(self, first: Point) -> None:
         self.values = [function(first) for _, function in getattr(first.problem, "monitors", ())]
+        self._answer: tuple[object, Any] = (None, None)
 
     @property
     def alone(self) -> bool:
@@ -32,12 +44,41 @@ class Monitor:
         for k, (kind, function) in enumerate(getattr(problem, "monitors", ())):
             values = [self.values[k], *(function(p) for p in knots[1:])]
             self.values[k] = values[-1]
-            for (p, gp), (q, gq) in zip(zip(knots, values), zip(knots[1:], values[1:])):
+            exact = getattr(function, "exact", function)
+            for (p, gp), (q, gq) in pairwise(zip(knots, values)):
                 if gq != 0 and not gp * gq < 0:
                     continue
                 # a knot may lie on the zero itself: the middle of a segment that is symmetric about it
-                point = q if gq == 0 else locator.zero(p, q, function, gp, gq)
-                named = None if point is None else problem.confirmed(kind, point, max(abs(gp), abs(gq)))  # type: ignore[attr-defined]
-                if point is not None and named is not None:
-                    found.append(Found(point, named, (p.parameter, q.parameter), abs(q.s - p.s) * 1e-13))
+                point = q if gq == 0 else locator.zero(p, q, exact, gp, gq)
+                found += _named(kind, point, p, q, max(abs(gp), abs(gq)))
+        return found + self._crossings(locator, knots)
+
+    def _crossings(self, locator: Locator, knots: list[Point]) -> list[Found]:
+        problem, found = knots[0].problem, []
+        response = getattr(problem, "response", None)
+        if response is None:
+            return []
+        answer = self._answer[1] if self._answer[0] is knots[0].u else response(knots[0])
+        for p, q in pairwise(knots):
+            after = response(q)
+            if answer is not None and after is not None and float(answer @ after) < 0:
+                size = float(np.linalg.norm(answer))
+
+                def inverse(z: Point, before: Any = answer, size: float = size) -> float:
+                    x = response(z)
+                    product = math.nan if x is None else float(before @ x) / size
+                    return 1 / product if product else math.inf
+
+                ends = (1 / size, inverse(q))
+                found += _named(Kind.BRANCH_POINT, locator.zero(p, q, inverse, *ends), p, q, max(map(abs, ends)))
+            answer = after
+        self._answer = (knots[-1].u, answer)
         return found
+
+
+def _named(kind: Kind, point: Point | None, p: Point, q: Point, scale: float) -> list[Found]:
+    """The event at a located zero, if the problem confirms it."""
+    if point is None:
+        return []
+    named = point.problem.confirmed(kind, point, scale)  # type: ignore[attr-defined]
+    return [] if named is None else [Found(point, named, (p.parameter, q.parameter), abs(q.s - p.s) * 1e-13)]

@@ -92,8 +92,11 @@ MARKERS: Mapping[Kind, str] = MappingProxyType({
     Kind.FOLD_FLIP: "d",
     Kind.GENERALIZED_PERIOD_DOUBLING: "P",
     Kind.CHENCINER: "8",
+    Kind.EXTREMUM: "_",
+    Kind.ISOLA_CENTRE: "o",
+    Kind.ISOLA_MERGER: "X",
 })  # fmt: skip
-_UNFILLED = frozenset("|x1234")
+_UNFILLED = frozenset("|_x1234")
 _CODIMENSION_ONE = frozenset({
     Kind.FOLD, Kind.BRANCH_POINT, Kind.HOPF, Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER, Kind.GRAZING,
 })  # fmt: skip

@@ -27,30 +27,40 @@ _KINDS = (Kind.FOLD, Kind.BRANCH_POINT, Kind.HOPF, Kind.PERIOD_DOUBLING, Kind.NE
 _NONE = NormalForm(None, None)
 
 
-def criticality_of(problem: Any, kind: Kind, u: Array, params: Array) -> NormalForm:
-    """Coefficient and word at a special point, (None, None) where nothing can be said; never raises for numerics."""
+def criticality_of(problem: Any, kind: Kind, u: Array, params: Array, linearisation: Any = None) -> NormalForm:
+    """Coefficient and word at a special point, (None, None) where nothing can be said; never raises for numerics.
+
+    `linearisation`: the problem's there, where it is known already.
+    """
     if kind not in _KINDS:
         return _NONE
     try:
-        forms = _forms(problem, u, params)
+        forms = _forms(problem, u, params, linearisation)
         if forms is None or not np.isfinite(forms.matrix).all():
             return _NONE
-        return normal_form(kind, forms, problem.critical.circle)
+        return _of_whole_period(problem, kind, normal_form(kind, forms, problem.critical.circle))
     except (np.linalg.LinAlgError, StabilityError):
         return _NONE
 
 
-def _forms(problem: Any, u: Array, params: Array) -> Any:
+def _of_whole_period(problem: Any, kind: Kind, found: NormalForm) -> NormalForm:
+    """From the half-period map N to N^2: x + a x^2 -> x + 2 a x^2, and -x + b x^3 -> x - 2 b x^3, a pitchfork."""
+    if found.coefficient is None or not getattr(problem, "halved", False):
+        return found
+    return found._replace(coefficient=(-2.0 if kind is Kind.PERIOD_DOUBLING else 2.0) * found.coefficient)
+
+
+def _forms(problem: Any, u: Array, params: Array, L: Any) -> Any:
     from .collocation import Collocation
     from .equilibria import Equilibrium
 
     if isinstance(problem, Equilibrium):
-        return FieldForms(problem.linearise(u, params))
+        return FieldForms(problem.linearise(u, params) if L is None else L)
     if not isinstance(problem, Collocation):
         if not hasattr(problem, "discretise"):
             return None
         orbit = problem.view(u, params)
         multiple = int(getattr(problem, "subharmonic", getattr(problem, "multiple", 1)))
         problem = Collocation(problem.system, multiple=multiple)
-        u = problem.start(params, orbit)
-    return MapForms(problem.linearise(u, params))
+        u, L = problem.start(params, orbit), None
+    return MapForms(problem.linearise(u, params) if L is None else L)

@@ -33,7 +33,10 @@ from ..errors import InputError
 from ..protocols import Critical, Linearisation, Problem
 from ..words import Kind
 
-__all__ = ["Equations", "Frame", "Located", "equations", "first_extra", "frame_of", "locate", "singular_matrix"]
+__all__ = [
+    "Conditions", "Equations", "Frame", "Located", "conditions", "equations", "first_extra", "frame_of", "gradients",
+    "locate", "singular_matrix", "values_in",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 _PAIRS = (Kind.HOPF, Kind.NEIMARK_SACKER)
@@ -41,11 +44,22 @@ _MAX_NEWTON = 12
 
 
 class Frame(NamedTuple):
-    """Constant borders W (k, a), V (l, b) and, for pairs, the two directions `combination` (2, a b) of G that count."""
+    """Constant borders W (k, a), V (l, b) and, for pairs, the two functions `combination` (2, a b) of G that count."""
 
     left: NDArray[Any]
     right: NDArray[Any]
     combination: Array | None
+
+
+class Conditions(NamedTuple):
+    """Conditions g (q,) at one iterate with the borders taken there: v = V and w = W, G = -(smallest singular values).
+
+    `orientation` is the sign by which g differs from a function that is smooth along a curve (0: none is known).
+    """
+
+    g: Array
+    frame: Frame
+    orientation: int
 
 
 class Equations(NamedTuple):
@@ -108,18 +122,30 @@ def first_extra(kind: Kind, critical: Critical, values: NDArray[Any]) -> Array:
     return np.array([nearest.real / abs(nearest) if critical.circle else abs(nearest) ** 2])
 
 
+def conditions(kind: Kind, L: Linearisation, critical: Critical, free: str, extra: Array) -> Conditions:
+    """The conditions with borders from the singular vectors of the smallest singular values at this point."""
+    A = singular_matrix(kind, L, critical, free, extra)
+    k, c = A.shape
+    a = min(2 if kind in _PAIRS else 1, k)
+    b = a + c - k
+    left, sizes, right = np.linalg.svd(A)
+    W, V = left[:, k - a :].conj(), right[c - b :].conj().T
+    G = np.zeros((a, b))
+    G[:, :a] = -np.diag(sizes[k - a :])
+    if kind in _PAIRS:
+        # coordinates in the span of W^T V and W^T M V: no rotation or reflection of the borders changes them
+        pair = np.stack([(W.T @ V).ravel(), (W.T @ L.spectral @ V).ravel()], axis=1)
+        combination = np.linalg.pinv(pair)
+        return Conditions(combination @ G.ravel(), Frame(W, V, combination), 1)
+    orientation = 0
+    if c == k and not np.iscomplexobj(A):
+        orientation = int(np.sign(np.linalg.det(left) * np.linalg.det(right)))
+    return Conditions(G.ravel(), Frame(W, V, None), orientation)
+
+
 def frame_of(kind: Kind, L: Linearisation, critical: Critical, free: str, extra: Array) -> Frame:
     """Borders from the singular vectors that belong to the smallest singular values at this point."""
-    A = singular_matrix(kind, L, critical, free, extra)
-    k = A.shape[0]
-    a = min(2 if kind in _PAIRS else 1, k)
-    b = a + A.shape[1] - k
-    left, _, right = np.linalg.svd(A)
-    W, V = left[:, k - a :].conj(), right[A.shape[1] - b :].conj().T
-    if kind not in _PAIRS:
-        return Frame(W, V, None)
-    pair = np.stack([(W.T @ V).ravel(), (W.T @ L.spectral @ V).ravel()], axis=1)
-    return Frame(W, V, np.linalg.qr(pair)[0].T)
+    return conditions(kind, L, critical, free, extra).frame
 
 
 def _gradient(
@@ -140,28 +166,59 @@ def _gradient(
     return first[0] + second[0], first[1] + second[1], np.array([by_extra])
 
 
+def gradients(
+    kind: Kind, L: Linearisation, critical: Critical, free: str, extra: Array, found: Conditions
+) -> Equations:
+    """The conditions and their exact gradients at the point whose singular vectors are the borders."""
+    return _assembled(kind, L, critical, free, extra, found.frame, found.g, found.frame.left, found.frame.right)
+
+
+def _bordered(A: NDArray[Any], frame: Frame) -> NDArray[Any]:
+    (_, a), (_, b) = frame.left.shape, frame.right.shape
+    return np.block([[A, frame.left], [frame.right.T, np.zeros((b, a), dtype=A.dtype)]])
+
+
+def values_in(kind: Kind, L: Linearisation, critical: Critical, free: str, extra: Array, frame: Frame) -> Array:
+    """The conditions g for any constant borders, without gradients."""
+    A = singular_matrix(kind, L, critical, free, extra)
+    k, b = A.shape[0], frame.right.shape[1]
+    right = np.zeros((k + b, b))
+    right[k:] = np.eye(b)
+    g = np.linalg.solve(_bordered(A, frame), right)[A.shape[1] :].ravel()
+    return np.real(g if frame.combination is None else frame.combination @ g)
+
+
 def equations(
     kind: Kind, L: Linearisation, critical: Critical, free: str, extra: Array, frame: Frame
 ) -> Equations:
     """The conditions g = 0 of a kind and their exact gradients, for any constant frame."""
     A = singular_matrix(kind, L, critical, free, extra)
     (k, a), (c, b) = frame.left.shape, frame.right.shape
-    K = np.block([[A, frame.left], [frame.right.T, np.zeros((b, a), dtype=A.dtype)]])
+    K = _bordered(A, frame)
     unit = np.zeros((c + a, b))
     unit[k:] = np.eye(b)
     solution = np.linalg.solve(K, unit)
-    v, G = solution[:c], solution[c:]
+    v, g = solution[:c], solution[c:].ravel()
     unit = np.zeros((k + b, a))
     unit[c:] = np.eye(a)
     w = np.linalg.solve(K.T, unit)[:k]
-    parts = [[_gradient(kind, L, critical, free, extra, w[:, i], v[:, j]) for j in range(b)] for i in range(a)]
-    by_u, by_params, by_extra = (
-        -np.array([part[which] for row in parts for part in row]) for which in range(3)
-    )
-    g = G.ravel()
+    g = g if frame.combination is None else frame.combination @ g
+    return _assembled(kind, L, critical, free, extra, frame, g, w, v)
+
+
+def _assembled(
+    kind: Kind, L: Linearisation, critical: Critical, free: str, extra: Array, frame: Frame, g: NDArray[Any],
+    w: NDArray[Any], v: NDArray[Any],
+) -> Equations:  # fmt: skip
+    parts = [
+        _gradient(kind, L, critical, free, extra, w[:, i], v[:, j])
+        for i in range(w.shape[1])
+        for j in range(v.shape[1])
+    ]
+    by_u, by_params, by_extra = (-np.array([part[which] for part in parts]) for which in range(3))
     if frame.combination is not None:
         P = frame.combination
-        g, by_u, by_params, by_extra = P @ g, P @ by_u, P @ by_params, P @ by_extra
+        by_u, by_params, by_extra = P @ by_u, P @ by_params, P @ by_extra
     return Equations(np.real(g), np.real(by_u), np.real(by_params), np.real(by_extra), w, v)
 
 
@@ -240,14 +297,14 @@ def _newton_step(
     problem: Problem, kind: Kind, L: Linearisation, critical: Critical, free: str, k: int, at: _Iterate
 ) -> tuple[Array, Equations]:
     """One Newton step for (u, lambda, extra), stacked; frames from the singular vectors of this iterate."""
-    frame = frame_of(kind, L, critical, free, at.extra)
-    found = equations(kind, L, critical, free, at.extra, frame)
+    begun = conditions(kind, L, critical, free, at.extra)
+    found = gradients(kind, L, critical, free, at.extra, begun)
     n, q, e = at.u.size, found.g.size, at.extra.size
     columns = np.zeros((n, 1 + e))
     columns[:, 0] = L.column(free)
     residual = np.array(L.residual)
     if kind is Kind.BRANCH_POINT:
-        columns[:, 1] = L.embed(np.real(frame.left[:, 0]))
+        columns[:, 1] = L.embed(np.real(begun.frame.left[:, 0]))
         residual = residual + at.extra[0] * columns[:, 1]
     if q != 1 + e:  # a pair needs two states at least
         raise np.linalg.LinAlgError("the defining system is not square")

@@ -26,7 +26,8 @@ from ..protocols import Corrected, Critical, Seed, Spectrum, Tangent
 from ..results.revival import revive
 from ..words import Kind, Verdict
 from .defining import first_extra, singular_matrix
-from .locus_system import ExtendedLinearisation, Place
+from .locus_newton import corrected, response
+from .locus_system import Place
 from .locus_tests import confirmed, monitors
 
 __all__ = ["CURVES", "Locus"]
@@ -34,8 +35,6 @@ __all__ = ["CURVES", "Locus"]
 Array = NDArray[np.float64]
 CURVES = (Kind.FOLD, Kind.BRANCH_POINT, Kind.HOPF, Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER)
 _PAIRS = (Kind.HOPF, Kind.NEIMARK_SACKER)
-_MAX_NEWTON = 10
-_UNFOLDED = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,100 +149,67 @@ class Locus:
     def correct(
         self, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
     ) -> Corrected:
-        """The bordered Newton solve of `locus_system`, quadratically convergent."""
-        k, n = list(self.parameters).index(free), u.size
-        params, w = np.array(params, dtype=float), self.weights
-        if tangent is not None:
-            u, params[k] = u + ds * tangent.u, params[k] + ds * tangent.parameter
-        row = self._row(tangent, n)
-        right = np.zeros((n + 1, 2))
-        right[n, 1] = 1.0
-        weight = 0.0 if tangent is None else tangent.weight
-        last, begun = math.inf, self._ordered(u, params[k])
-        for iteration in range(1, _MAX_NEWTON + 1):
-            try:
-                L = ExtendedLinearisation.at(self, u, params, free)
-            except np.linalg.LinAlgError:
-                return _failed(u, params, iteration, "singular")
-            right[:n, 0] = -L.residual
-            right[n, 0] = -float(row @ (self._ordered(u, params[k]) - begun))
-            step = L.solve_bordered(row, right)
-            du, dl = self._split(step[:, 0])
-            size = math.sqrt(float(w @ du**2) + (weight * dl) ** 2) if np.isfinite(step).all() else math.nan
-            scale = 1.0 + math.sqrt(float(w @ u**2))
-            if not math.isfinite(size):
-                return _failed(u, params, iteration, "singular")
-            u = u + du
-            params[k] += dl
-            if size <= tolerance * scale and self._extra_settled(du, u):
-                return self._succeeded(u, params, free, tangent, step[:, 1], iteration)
-            if (iteration > 2 and size > 4 * last) or size > 1e6 * scale:
-                break
-            last = size
-        return _failed(u, params, iteration, "no convergence")
+        """The bordered Newton solve of `locus_newton`."""
+        return corrected(self, u, params, free, tangent, ds, tolerance)
 
-    def _extra_settled(self, du: Array, u: Array) -> bool:
-        e = self.parts(u)[2]
-        return bool((np.abs(self.parts(du)[2]) <= 1e-6 * (1 + np.abs(e))).all())
+    def residual_at(self, u: Array, params: Array) -> float:
+        """Largest residual of the inner equations, and the singular values that ought to be zero.
 
-    def _succeeded(
-        self, u: Array, params: Array, free: str, tangent: Tangent | None, direction: Array, iterations: int
-    ) -> Corrected:
-        t_u, rate = self._split(direction)
-        if tangent is None:
-            new = Tangent(t_u, 1.0, 1.0)
-        else:
-            length = math.sqrt(float(self.weights @ t_u**2) + (tangent.weight * rate) ** 2)
-            new = Tangent(t_u / length, rate / length, tangent.weight)
-        try:
-            residual = self._residual(u, params)
-        except np.linalg.LinAlgError:
-            return _failed(u, params, iterations, "singular")
-        if self.kind is Kind.BRANCH_POINT and abs(self.parts(u)[2][0]) > _UNFOLDED:
-            return _failed(u, params, iterations, f"no branch point: '{self.free}' unfolds it")
-        return Corrected(u, self.completed(u, params), new, residual, iterations, 0, None, math.isfinite(residual))
-
-    def _residual(self, u: Array, params: Array) -> float:
-        """Largest residual of the inner equations, and the singular values that ought to be zero."""
+        Raises
+        ------
+        LinAlgError
+            The linearisation is not finite.
+        """
         x, _, extra = self.parts(u)
         L = self.inner.linearise(x, self.completed(u, params))
         A = singular_matrix(self.kind, L, self.inner.critical, self.along, extra)
         values = np.linalg.svd(A, compute_uv=False)
-        self._memo["inner"] = (u, L)
+        self.remember("inner", u, L)
         return float(max(np.max(np.abs(L.residual)), values[-2 if self.kind in _PAIRS and values.size > 1 else -1]))
+
+    def remember(self, what: str, u: Array, value: Any) -> None:
+        """Keep something that belongs to this very array u, until the next one."""
+        self._memo[what] = (u, value)
+
+    def recalled(self, what: str, u: Array) -> Any:
+        """What is remembered for u, else None."""
+        known = self._memo.get(what)
+        return known[1] if known is not None and known[0] is u else None
 
     def inner_linearisation(self, u: Array, params: Array) -> Any:
         """The inner problem's linearisation, remembered for the last point."""
-        known = self._memo.get("inner")
-        if known is None or known[0] is not u:
-            known = self._memo["inner"] = (u, self.inner.linearise(self.parts(u)[0], self.completed(u, params)))
-        return known[1]
+        L = self.recalled("inner", u)
+        if L is None:
+            L = self.inner.linearise(self.parts(u)[0], self.completed(u, params))
+            self.remember("inner", u, L)
+        return L
 
     def inner_values(self, u: Array, params: Array) -> NDArray[np.complex128]:
         """The inner problem's multipliers or eigenvalues, remembered for the last point."""
         return np.asarray(self._inner_spectrum(u, params).values)
 
     def _inner_spectrum(self, u: Array, params: Array) -> Spectrum:
-        known = self._memo.get("spectrum")
-        if known is None or known[0] is not u:
+        spectrum = self.recalled("spectrum", u)
+        if spectrum is None:
             L = self.inner_linearisation(u, params)
             if self.kind is Kind.FOLD:
                 self._settled(u, params)
-            known = self._memo["spectrum"] = (u, self.inner.spectrum(L))
-        return known[1]  # type: ignore[no-any-return]
+            spectrum = self.inner.spectrum(L)
+            self.remember("spectrum", u, spectrum)
+        return spectrum  # type: ignore[no-any-return]
 
-    def _row(self, tangent: Tangent | None, n: int) -> Array:
+    def row_of(self, tangent: Tangent | None, n: int) -> Array:
         """The last row in the order (u, lambda_1, lambda_2, e)."""
         if tangent is None:
-            return self._ordered(np.zeros(n), 1.0)
-        return self._ordered(self.weights * tangent.u, tangent.parameter * tangent.weight**2)
+            return self.ordered(np.zeros(n), 1.0)
+        return self.ordered(self.weights * tangent.u, tangent.parameter * tangent.weight**2)
 
-    def _ordered(self, U: Array, first: float) -> Array:
+    def ordered(self, U: Array, first: float) -> Array:
         """(u, lambda_1, lambda_2, e) from U = (u, lambda_2, e) and lambda_1."""
         return np.insert(U, U.size - 1 - self.extras, first)
 
-    def _split(self, x: Array) -> tuple[Array, float]:
-        """The inverse of `_ordered`."""
+    def split(self, x: Array) -> tuple[Array, float]:
+        """The inverse of `ordered`."""
         place = x.size - 2 - self.extras
         return np.delete(x, place), float(x[place])
 
@@ -267,6 +233,15 @@ class Locus:
     def monitors(self) -> tuple[tuple[Kind, Any], ...]:
         """Functions of a point of this curve whose zeros are points of codimension two (see `locus_tests`)."""
         return monitors(self)
+
+    def response(self, point: Any) -> Array | None:
+        """How the linearised curve answers a fixed change of its conditions: infinitely where it branches."""
+        if self.kind is Kind.BRANCH_POINT:
+            return None
+        answer = response(point)
+        if answer is None or not answer.any():
+            return None
+        return answer * np.sqrt(self.ordered(self.weights, point.tangent.weight**2))  # type: ignore[no-any-return]
 
     def confirmed(self, kind: Kind, point: Any, scale: float) -> Kind | None:
         """The kind of a zero that was located; None where it is no special point."""
@@ -341,7 +316,3 @@ class Locus:
 
     def _solution(self, u: Array, params: Array) -> Array:
         return self._settled(u, params) if self.kind is Kind.FOLD else self.parts(u)[0]
-
-
-def _failed(u: Array, params: Array, iterations: int, note: str) -> Corrected:
-    return Corrected(u, params, None, math.inf, iterations, 0, None, False, note)

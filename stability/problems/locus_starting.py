@@ -82,15 +82,22 @@ def locus(point: SpecialPoint, *, free: str, along: str | None = None) -> Locus:
         raise InputError(
             f"'{free}' is the parameter of the branch itself: name another one, or say along='...' which to follow"
         )
+    for name in (free, along):
+        getattr(problem, "check_free", _anything)(name)
     return _born(problem, point, free, along)
+
+
+def _anything(name: str) -> None:
+    """Problems without a symmetry let every parameter go."""
 
 
 def _born(problem: Problem, point: SpecialPoint, free: str, along: str) -> Locus:
     params = point.params_vector
     second = point.params[free]
-    extra = first_extra(point.kind, problem.critical, point.multipliers)
+    kind = point.defining_kind
+    extra = first_extra(kind, problem.critical, point.critical_values)
     scale = max(abs(second), _SMALLEST_SCALE * (abs(problem.parameters[free]) or 1.0))
-    curve = Locus(problem, point.kind, free, along, scale)
+    curve = Locus(problem, kind, free, along, scale)
     U = np.concatenate([point.u, [second], extra])
     try:
         L = ExtendedLinearisation.at(curve, U, params, along)
@@ -102,7 +109,7 @@ def _born(problem: Problem, point: SpecialPoint, free: str, along: str) -> Locus
             f"the curve through {point.label} has no direction there: a point of higher codimension; begin beside it",
             last=point.u,
         )
-    if point.kind is Kind.BRANCH_POINT and abs(direction[0][-1]) > 1e-5 * _size(curve, direction[0]):
+    if kind is Kind.BRANCH_POINT and abs(direction[0][-1]) > 1e-5 * _size(curve, direction[0]):
         raise InputError(
             f"{point.label} is a crossing that '{free}' breaks up: no branch points beside it. Follow the folds near "
             f"it, or a parameter that keeps the symmetry or the trivial solution which makes it"
@@ -127,4 +134,4 @@ def _direction(curve: Locus, L: ExtendedLinearisation) -> tuple[Array, float] | 
         if not (math.isfinite(length) and length > 0):
             return None
         row = w * t / length
-    return curve._split(t / length)
+    return curve.split(t / length)

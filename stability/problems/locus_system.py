@@ -12,7 +12,9 @@ where e b stands for the unfolding of a branch point only. One Newton step is on
                                 [ de  ]
 
 The borders of g are taken anew from the singular vectors at every iterate: g changes by a regular factor, its zeros do
-not, and no border can become orthogonal to what it has to complete. Reference: Kuznetsov (2004), 10.3.
+not, and no border can become orthogonal to what it has to complete. The gradients of g are the dearest part of a step:
+once Newton is close, one more step is made with the derivatives of the iterate before (g in that one's borders).
+Reference: Kuznetsov (2004), 10.3.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from numpy.typing import NDArray
 
 from ..protocols import Linearisation
 from ..words import Kind
-from .defining import Equations, equations, frame_of
+from .defining import Conditions, Equations, conditions, gradients, values_in
 
 if TYPE_CHECKING:
     from .locus import Locus
@@ -38,21 +40,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class ExtendedLinearisation:
-    """The inner linearisation at (u, p) and the conditions with their gradients; `names` = (lambda_1, lambda_2).
+    """The inner linearisation at (u, p) and the conditions; their gradients (sweeps) only when a step is solved.
 
     Attributes
     ----------
     inner : Linearisation of the inner problem
-    found : Equations, the conditions g and their gradients
-    columns : (N, 2 + e), derivatives of the inner equations by lambda_1, lambda_2 and the extra unknowns
+    begun : Conditions, g with the borders of this point
+    names : (lambda_1, lambda_2)
     """
 
     problem: Locus
     u: Array
     params: Array
     inner: Linearisation
-    found: Equations
-    columns: Array
+    begun: Conditions
     names: tuple[str, str]
 
     @classmethod
@@ -65,18 +66,29 @@ class ExtendedLinearisation:
             The linearisation is not finite, or the conditions are not regular.
         """
         inner, free = problem.inner, problem.free
-        u, extra = problem.parts(U)[0], problem.parts(U)[2]
+        u, _, extra = problem.parts(U)
         params = problem.completed(U, params)
         L = inner.linearise(u, params)
-        frame = frame_of(problem.kind, L, inner.critical, problem.along, extra)
-        found = equations(problem.kind, L, inner.critical, problem.along, extra, frame)
-        if found.g.size != 1 + extra.size:
+        begun = conditions(problem.kind, L, inner.critical, problem.along, extra)
+        if begun.g.size != 1 + extra.size:
             raise np.linalg.LinAlgError("a pair needs two states at least")
-        columns = np.zeros((u.size, 2 + extra.size))
-        columns[:, 0], columns[:, 1] = L.column(first), L.column(free)
+        return cls(problem, U, params, L, begun, (first, free))
+
+    @cached_property
+    def found(self) -> Equations:
+        """The conditions g and their gradients."""
+        problem, extra = self.problem, self.problem.parts(self.u)[2]
+        return gradients(problem.kind, self.inner, problem.inner.critical, problem.along, extra, self.begun)
+
+    @cached_property
+    def columns(self) -> Array:
+        """(N, 2 + e), derivatives of the inner equations by lambda_1, lambda_2 and the extra unknowns."""
+        problem = self.problem
+        columns = np.zeros((self.u.size - 1 - problem.extras, 2 + problem.extras))
+        columns[:, 0], columns[:, 1] = self.inner.column(self.names[0]), self.inner.column(self.names[1])
         if problem.kind is Kind.BRANCH_POINT:
-            columns[:, 2] = L.embed(np.real(frame.left[:, 0]))
-        return cls(problem, U, params, L, found, columns, (first, free))
+            columns[:, 2] = self.inner.embed(np.real(self.begun.frame.left[:, 0]))
+        return columns
 
     @property
     def residual(self) -> Array:
@@ -84,7 +96,26 @@ class ExtendedLinearisation:
         F = np.array(self.inner.residual)
         if self.problem.kind is Kind.BRANCH_POINT:
             F = F + self.problem.parts(self.u)[2][0] * self.columns[:, 2]
-        return np.concatenate([F, self.found.g])
+        return np.concatenate([F, np.real(self.begun.g)])
+
+    def residual_elsewhere(self, other: ExtendedLinearisation) -> Array:
+        """The same at another point, with the borders of this one: for a step by this point's derivatives."""
+        problem, extra = self.problem, self.problem.parts(other.u)[2]
+        F = np.array(other.inner.residual)
+        if problem.kind is Kind.BRANCH_POINT:
+            F = F + extra[0] * self.columns[:, 2]
+        frame = self.begun.frame
+        g = values_in(problem.kind, other.inner, problem.inner.critical, problem.along, extra, frame)
+        return np.concatenate([F, g])
+
+    @property
+    def unfolding(self) -> Array:
+        """(N + q,) a change of the conditions alone that varies smoothly along the curve; zeros where none is known.
+
+        A curve branches where no change of (u, lambda_1, lambda_2, e) answers it.
+        """
+        g = self.begun.orientation * np.array([1.0, 0.6])[: self.begun.g.size]
+        return np.concatenate([np.zeros(self.u.size - 1 - self.problem.extras), g])
 
     def column(self, name: str) -> Array:
         """(N + q,): derivative by any parameter but lambda_2."""

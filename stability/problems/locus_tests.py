@@ -14,6 +14,12 @@ the product pi over pairs of the values that are not critical, lambda_i + lambda
 chi' at the critical value is a symmetric function of all values, smooth where two of them meet (each of them alone is
 not). Where the rate of the followed parameter vanishes the curve turns (fold); where both rates do, on a fold curve, it
 is a cusp.
+
+Where the rate of the second parameter vanishes it is extreme: the tip of a tongue (extremum). On a fold curve the
+reduced equation h(x, lambda_1) = 0 at that lambda_2 is singular, h = h_x = h_1 = 0, and the sign of
+h_xx h_11 - h_x1^2 = - lambda_2'' h_2 h_xx (derivatives along the curve, l_1' = 1) tells an isola centre (+: a closed
+branch is born) from a merger (-: two branches meet and change partners).
+
 A zero that is a pole, or a neutral saddle (real values whose sum is 0, whose product is 1), is no such point.
 Reference: Kuznetsov (2004), chapters 8, 9 and section 10.4.
 """
@@ -28,6 +34,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..words import Kind
+from .locus_newton import response, sharpened
+from .locus_system import ExtendedLinearisation
 
 if TYPE_CHECKING:
     from .locus import Locus
@@ -36,15 +44,40 @@ __all__ = ["confirmed", "monitors"]
 
 Complex = NDArray[np.complex128]
 _STILL = 1e-4  # scaled rate of both parameters at a cusp
+_NOISE = 1e-9  # a scaled rate below this is rounding: the parameter is constant along the curve
+_ASIDE = 1e-3  # arclength to the neighbours that tell the sign of a second derivative
+_GROWN = 1e3  # how much the answer to a change of the equations has grown where a curve branches
+
+
+class Rate:
+    """The rate of a parameter along the curve; `exact` takes the tangent of the point's own derivatives."""
+
+    def __init__(self, of: Callable[[Any], float]) -> None:
+        self.of = of
+
+    def __call__(self, point: Any) -> float:
+        value = self.of(point)
+        return value if abs(value) > _NOISE else 0.0
+
+    def exact(self, point: Any) -> float:
+        """The same without the error that a cheap last Newton step leaves in the tangent."""
+        return self.of(sharpened(point))
+
+
+def _first(point: Any) -> float:
+    return float(point.tangent.parameter * point.tangent.weight)
+
+
+def _second(point: Any) -> float:
+    return float(point.problem.parts(point.tangent.u)[1]) / float(point.problem.scale)
+
+
+_TURNS, _EXTREMA = Rate(_first), Rate(_second)
 
 
 def monitors(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
     """(kind, function of a point of the curve): where it turns, and every point of codimension two it can have."""
-    return ((Kind.FOLD, _rate), *_by_kind(curve))
-
-
-def _rate(point: Any) -> float:
-    return float(point.tangent.parameter)
+    return ((Kind.FOLD, _TURNS), (Kind.EXTREMUM, _EXTREMA), *_by_kind(curve))
 
 
 def _by_kind(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
@@ -70,10 +103,11 @@ def _by_kind(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
 
 def confirmed(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
     """The kind of a located zero, or None: nothing. `scale`: largest modulus of the function at the bracket's ends."""
-    if kind is Kind.FOLD:
-        second = curve.parts(point.tangent.u)[1] / curve.scale
-        still = abs(second) < _STILL and abs(point.tangent.parameter * point.tangent.weight) < _STILL
-        return Kind.CUSP if still and curve.kind is Kind.FOLD else kind
+    if kind in (Kind.FOLD, Kind.EXTREMUM):
+        return _extreme(curve, kind, sharpened(point), scale)
+    if kind is Kind.BRANCH_POINT:
+        answer = response(point)
+        return kind if answer is not None and float(np.linalg.norm(answer)) * scale > _GROWN else None
     function = dict(monitors(curve)).get(kind)
     if function is None:
         return kind
@@ -89,6 +123,36 @@ def confirmed(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None
     if curve.kind is Kind.HOPF and kind is not Kind.BOGDANOV_TAKENS and not curve.parts(point.u)[2][0] > 0:
         return None  # beyond a Bogdanov-Takens point: neutral saddles
     return kind
+
+
+def _extreme(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
+    """What it is where a parameter's rate vanishes."""
+    if scale < 10 * _NOISE:
+        return None
+    if abs(_first(point)) < _STILL and abs(_second(point)) < _STILL and curve.kind is Kind.FOLD:
+        return Kind.CUSP if kind is Kind.FOLD else None
+    if kind is Kind.FOLD or curve.kind is not Kind.FOLD:
+        return kind
+    sign = _hessian_sign(curve, point)
+    return Kind.EXTREMUM if not sign else Kind.ISOLA_CENTRE if sign > 0 else Kind.ISOLA_MERGER
+
+
+def _hessian_sign(curve: Locus, point: Any) -> int:
+    """Sign of h_xx h_11 - h_x1^2 (see the head of this file); 0: not found."""
+    ends = []
+    for step in (-_ASIDE, _ASIDE):
+        found = curve.correct(point.u, point.params, curve.along, point.tangent, step, 1e-11)
+        if not found.converged:
+            return 0
+        ends.append(curve.parts(found.u)[1])
+    bend = ends[0] - 2 * curve.parts(point.u)[1] + ends[1]
+    try:
+        L = ExtendedLinearisation.at(curve, point.u, point.params, curve.along)
+        w, v = np.real(L.begun.frame.left[:, 0]), np.real(L.begun.frame.right[:, 0])
+        h_2, h_xx = float(w @ L.inner.core_column(curve.free)), -float(L.found.by_u[0] @ np.real(L.inner.lift(v)))
+    except np.linalg.LinAlgError:
+        return 0
+    return int(np.sign(-bend * h_2 * h_xx))
 
 
 def _values(point: Any) -> Complex:
@@ -138,5 +202,6 @@ def _coefficient(point: Any) -> float:
 
     curve = point.problem
     u, params = curve.parts(point.u)[0], curve.completed(point.u, point.params)
-    coefficient = criticality_of(curve.inner, curve.kind, u, params).coefficient
+    L = curve.inner_linearisation(point.u, point.params)
+    coefficient = criticality_of(curve.inner, curve.kind, u, params, L).coefficient
     return math.nan if coefficient is None else coefficient

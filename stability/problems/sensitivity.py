@@ -28,7 +28,7 @@ from ..protocols import Critical
 from ..results.sensitivity_table import Sensitivity
 from ..results.special import SpecialPoint
 from ..words import Kind
-from .defining import equations, first_extra, frame_of
+from .defining import conditions, first_extra, gradients
 from .locus import Locus
 
 __all__ = ["sensitivity"]
@@ -42,8 +42,8 @@ def sensitivity(point: SpecialPoint, of: str | None = None) -> Sensitivity:
     """Derivatives of the place of a special point by all other parameters (see `SpecialPoint.sensitivity`)."""
     if not isinstance(point, SpecialPoint):
         raise InputError(f"a sensitivity needs a special point such as branch['PD1'], got {type(point).__name__}")
-    problem, kind, u, params = point.problem, point.kind, np.array(point.u), point.params_vector
-    along, values = point.free, point.multipliers
+    problem, kind, u, params = point.problem, point.defining_kind, np.array(point.u), point.params_vector
+    along, values = point.free, point.critical_values
     extra = None
     if isinstance(problem, Locus):
         params = problem.completed(u, params)
@@ -63,7 +63,7 @@ def sensitivity(point: SpecialPoint, of: str | None = None) -> Sensitivity:
     angle = _angle_rates(problem.critical, kind, extra, x[u.size + 1 :])
     return Sensitivity(
         label=point.label,
-        kind=kind,
+        kind=kind if point.defining_kind is point.kind else point.kind,
         name=of,
         value=float(params[names.index(of)]),
         params=dict(zip(names, params.tolist())),
@@ -80,15 +80,15 @@ def _derivatives(
     names = list(problem.parameters)
     L = problem.linearise(u, params)
     try:
-        frame = frame_of(kind, L, problem.critical, along, extra)
-        found = equations(kind, L, problem.critical, along, extra, frame)
+        begun = conditions(kind, L, problem.critical, along, extra)
+        found = gradients(kind, L, problem.critical, along, extra, begun)
     except np.linalg.LinAlgError:
         raise ConvergenceError("the conditions of this point are singular", last=u) from None
     n, q, e = u.size, found.g.size, extra.size
     columns = np.zeros((n, 1 + e))
     columns[:, 0] = L.column(of)
     if kind is Kind.BRANCH_POINT:
-        columns[:, 1] = L.embed(np.real(frame.left[:, 0]))
+        columns[:, 1] = L.embed(np.real(begun.frame.left[:, 0]))
     k = names.index(of)
     corner = np.column_stack([found.by_params[:, k], found.by_extra.reshape(q, e)])
     rest = [i for i in range(len(names)) if i != k]
@@ -99,10 +99,11 @@ def _derivatives(
             f"'{of}' does not move this point, or it is one of higher codimension: its place has no derivative",
             last=u,
         )
-    breaking: set[int] = set()
+    symmetry = getattr(problem, "symmetry", None)  # of orbits on half of their period: what breaks it has no place there
+    breaking = {i for i, j in enumerate(rest) if symmetry is not None and names[j] in symmetry.fixed}
     if kind is Kind.BRANCH_POINT:
         drive = np.abs(right[:n]).max(axis=0)
-        breaking = {i for i in range(len(rest)) if abs(x[n + 1, i]) * np.abs(columns[:, 1]).max() > _BREAKS * drive[i]}
+        breaking |= {i for i in range(len(rest)) if abs(x[n + 1, i]) * np.abs(columns[:, 1]).max() > _BREAKS * drive[i]}
     return x, breaking
 
 

@@ -65,8 +65,9 @@ def test_zero_hopf_and_double_hopf():
     branch = st.continuation(st.Equilibrium(system), "a", (-2.0, 0.0), start=dict(u=1.0))
     curve = st.continuation(st.locus(branch["HB1"], free="b"), "a", (-1.5, 1.0))
     assert np.abs(curve.columns["b"] - curve.columns["a"] ** 2).max() < 1e-10
-    (point,) = [p for p in curve.special if p.kind is not Kind.USER and p.kind is not Kind.FOLD]
-    assert point.kind is Kind.ZERO_HOPF and abs(point.params["a"]) < 1e-8
+    found = {p.kind: p for p in curve.special if p.kind is not Kind.USER}
+    assert set(found) == {Kind.ZERO_HOPF, Kind.EXTREMUM} and len(curve.special) == 3
+    assert all(abs(point.params["a"]) < 1e-8 for point in found.values())
     r, s = x**2 + y**2, u**2 + v**2
     pairs = ((a - r) * x - y, (a - r) * y + x, (b - s) * u - 2 * v, (b - s) * v + 2 * u)
     names = ("x", "y", "u", "v")
