@@ -70,13 +70,22 @@ def collapsed(point: Point) -> bool:
     """Whether an orbit repeats itself after half its period, or stands still: a family has come back to its parents.
 
     Doubled orbits end where they become the simple orbit twice over, orbits born at a Hopf point where they shrink to
-    an equilibrium; beyond, the same solutions follow shifted in time. Differences count relative to the states' scales.
+    an equilibrium; beyond, the same solutions follow shifted in time. Orbits that have lost a symmetry end where they
+    regain it; beyond, their images follow. Differences count relative to the states' scales.
     """
+    if not point.spectrum.error < 1.0:
+        return False  # close to a homoclinic orbit, which stands still for nearly all of its period
+    mirror = getattr(point.problem, "mirror", None)
     solution = point.problem.view(point.u, point.params)
     if not isinstance(solution, PeriodicOrbit):
         return False
     times = np.linspace(0.0, 0.5 * solution.period, 33)
     wound = 0.5 * np.asarray(solution.winding)[:, None]
-    first, second = solution(times), solution(times + 0.5 * solution.period) - wound
+    if mirror is not None:
+        times = np.linspace(0.0, (1.0 - mirror.fraction) * solution.period, 33)
+        first = mirror.symmetry.matrix @ solution(times)
+        second = solution(times + mirror.fraction * solution.period)
+    else:
+        first, second = solution(times), solution(times + 0.5 * solution.period) - wound
     size = np.maximum(np.abs(first).max(axis=1), getattr(point.problem, "scales", 0.0)) + 1e-300
     return bool((np.abs(first - second).max(axis=1) <= _COLLAPSED * size).all())

@@ -1,9 +1,11 @@
 r"""How long a step may be: prediction, the checks a new point must pass, and the next length.
 
-From the last point z_0 with unit tangent t_0 (and the one before, t_-1, a distance h_-1 back) the predictor is
+From the last point z_0 with unit tangent t_0, and z_-1 with t_-1 before it at distance d, the predictor is their cubic,
 
-    z = z_0 + h t_0 + h^2/2 (t_0 - t_-1)/h_-1,
+    z = z_0 + h t_0 + h^2 (t_0 - D)/d + h^2 (h + d) (t_0 - 2 D + t_-1)/d^2,      D = (z_0 - z_-1)/d,
 
+or, where h is much longer than d or the multipliers are lost in rounding errors (the recursion of cubics is unstable
+unless Newton's method mends every direction), the parabola of the tangents, z_0 + h t_0 + h^2/2 (t_0 - t_-1)/d. It is
 corrected orthogonally to t_0. The new point z_1 with tangent t_1 is accepted if
 
     angle(t_0, t_1) <= ANGLE               the curve does not turn too far,
@@ -25,7 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .points import Point, dot
+from .points import Point
 
 __all__ = ["Comparison", "Steps", "compare", "predict", "spectral_motion"]
 
@@ -33,6 +35,8 @@ Array = NDArray[np.float64]
 ANGLE, CHORD, MISSED, MOTION, KINK = 0.6, 0.15, 0.2, 0.7, 1e-4
 _FEW = 3
 _APPROACH, _CREEP = 0.8, 0.1
+_FAR, _LOST = 2.5, 0.1
+_SMALL = 6
 
 
 @dataclass(frozen=True)
@@ -73,12 +77,19 @@ class Comparison:
 
 def predict(last: Point, before: Point | None, h: float) -> tuple[Array, float]:
     """(u, parameter) of the predictor; `before` None, or on another mesh, gives the tangent predictor."""
-    t = last.tangent
-    u, parameter = last.u + h * t.u, last.parameter + h * t.parameter
-    if before is not None and before.u.size == last.u.size and before.problem is last.problem and last.step > 0:
-        bend = 0.5 * h * h / last.step
-        u += bend * (t.u - before.tangent.u)
-        parameter += bend * (t.parameter - before.tangent.parameter)
+    t, d = last.tangent, last.step
+    if before is None or before.problem is not last.problem or not d > 0:
+        return last.u + h * t.u, last.parameter + h * t.parameter
+    old = before.tangent
+    square, cube = h * h / d, h * h * (h + d) / (d * d)
+    if h > _FAR * d or not last.spectrum.error < _LOST:
+        cube = -0.5 * square
+    a, b = h + square + cube, (square + 2 * cube) / d
+    u = a * t.u + cube * old.u + last.u
+    parameter = a * t.parameter + cube * old.parameter + last.parameter
+    if b != 0.0:
+        u -= b * (last.u - before.u)
+        parameter -= b * (last.parameter - before.parameter)
     return u, parameter
 
 
@@ -92,9 +103,8 @@ def spectral_motion(a: NDArray[np.complex128], b: NDArray[np.complex128], circle
     """
     if not a.size or not b.size:
         return 0.0
-    if circle and a.size <= 3:
-        first, second = a.tolist(), b.tolist()
-        return max(_farthest(first, second), _farthest(second, first))
+    if circle and a.size <= _SMALL:
+        return _motion_on_sphere(a.tolist(), b.tolist())
     gap = np.abs(a[:, None] - b[None, :])
     if circle:
         gap /= np.sqrt(np.multiply.outer(1 + np.abs(a) ** 2, 1 + np.abs(b) ** 2))
@@ -103,58 +113,71 @@ def spectral_motion(a: NDArray[np.complex128], b: NDArray[np.complex128], circle
     return float(max(gap.min(axis=1).max(), gap.min(axis=0).max()))
 
 
-def _farthest(a: list[complex], b: list[complex]) -> float:
-    """Largest chordal distance of a multiplier of `a` from the set `b`."""
-    return max(
-        min(abs(x - y) / math.sqrt((1 + abs(x) ** 2) * (1 + abs(y) ** 2)) for y in b) for x in a
-    )
+def _motion_on_sphere(a: list[complex], b: list[complex]) -> float:
+    """The chordal Hausdorff distance of few multipliers."""
+    stretch = [1 + abs(y) ** 2 for y in b]
+    nearest, worst = [math.inf] * len(b), 0.0
+    for x in a:
+        size, least = 1 + abs(x) ** 2, math.inf
+        for k, y in enumerate(b):
+            gap = abs(x - y) / math.sqrt(size * stretch[k])
+            if gap < least:
+                least = gap
+            if gap < nearest[k]:
+                nearest[k] = gap
+        if least > worst:
+            worst = least
+    return max(worst, *nearest)
 
 
 def compare(last: Point, new: Point, guess: tuple[Array, float], rate: float = 0.0) -> Comparison:
     """The checks of the module's head for a candidate on the mesh of `last`; `guess` is where the corrector began."""
     w, t0, t1, weight = last.problem.weights, last.tangent, new.tangent, last.tangent.weight
     du, dl = new.u - last.u, (new.parameter - last.parameter) * weight
-    length = math.sqrt(dot(w, du, du) + dl * dl)
-    wt0 = w * t0.u
-    cosine = float(wt0 @ t1.u) + t0.parameter * t1.parameter * weight * weight
+    miss, miss_l = new.u - guess[0], (new.parameter - guess[1]) * weight
+    weighted = w * du
+    length = math.sqrt(float(weighted.dot(du)) + dl * dl)
+    cosine = float((w * t0.u).dot(t1.u)) + t0.parameter * t1.parameter * weight * weight
     angle = math.acos(max(-1.0, min(1.0, cosine)))
     if length == 0:
         return Comparison(0.0, angle / ANGLE, 0.0, 0.0, 0.0)
-    first = (float(wt0 @ du) + t0.parameter * weight * dl) / length
-    second = (dot(w, t1.u, du) + t1.parameter * weight * dl) / length
+    along = float(weighted.dot(t0.u)) + float(weighted.dot(t1.u)) + (t0.parameter + t1.parameter) * weight * dl
     mean = math.sqrt(max(2 + 2 * cosine, 1e-30))
-    chord = math.acos(max(-1.0, min(1.0, (first + second) / mean)))
-    du, dl = new.u - guess[0], (new.parameter - guess[1]) * weight
-    missed = math.sqrt(dot(w, du, du) + dl * dl) / length
+    chord = math.acos(max(-1.0, min(1.0, along / (length * mean))))
+    missed = math.sqrt(float((w * miss).dot(miss)) + miss_l * miss_l) / length
     motion = spectral_motion(last.spectrum.values, new.spectrum.values, last.problem.critical.circle, rate)
     return Comparison(length, angle / ANGLE, chord / CHORD, missed / MISSED, motion / MOTION)
 
 
 def room(last: Point, new: Point) -> float:
-    """Arclength left until some value, at its present rate, is critical: growth Re(lambda) or log|mu|, or a product.
+    """Arclength left until some value, at its present rate, is critical: growth Re(lambda) or log|mu|, or mu = +-1.
 
-    Steps that slow down before a crossing see pairs of crossings apart, and do not hop where branches cross.
+    Steps that slow down before a crossing see pairs of crossings apart, and do not hop where branches cross. Growth is
+    compared in order of size: the k-th largest is continuous along the curve and changes no faster than the values do,
+    while partners guessed among many values would seem to run.
     """
     a, b = last.spectrum.values, new.spectrum.values
     if not b.size or a.size != b.size:
         return math.inf
-    before, now = [last.tests[0], last.tests[1]], [new.tests[0], new.tests[1]]
-    earlier = a.tolist()
     circle = last.problem.critical.circle
-    for value in b.tolist():
-        like = min(earlier, key=lambda z, v=value: abs(z - v))  # type: ignore[misc]
-        if circle:
-            if value and like:
-                before.append(math.log(abs(like)))
-                now.append(math.log(abs(value)))
-        else:
-            before.append(like.real)
-            now.append(value.real)
     least = math.inf
-    for x, y in zip(before, now):
+    for x, y in zip(_margins(last, a.tolist(), circle), _margins(new, b.tolist(), circle)):
         if x * y > 0 and abs(y) < abs(x):
             least = min(least, abs(y) / (abs(x) - abs(y)))
     return least * new.step
+
+
+def _margins(point: Point, values: list[complex], circle: bool) -> list[float]:
+    """Signed distances to the limit: by the products of `smooth_tests` at +1, -1, and each value's growth, sorted."""
+    plus, minus, _ = point.tests
+    if not circle:
+        nearest = min(map(abs, values))
+        return [math.copysign(nearest, plus) if plus else 0.0, *sorted(z.real for z in values)]
+    margins = [
+        math.copysign(min(abs(z - 1) for z in values), plus) if plus else 0.0,
+        math.copysign(min(abs(z + 1) for z in values), minus) if minus else 0.0,
+    ]
+    return margins + [math.log(size) if size else -math.inf for size in sorted(map(abs, values))]
 
 
 def next_length(h: float, seen: Comparison, last: Point, new: Point, steps: Steps) -> float:
