@@ -98,6 +98,7 @@ class Seed(NamedTuple):
     kind: Kind  # of the point it is born at
     free: str  # the parameter along which that point was found
     avoid: tuple[Array, float] | None = None  # direction of the old branch: the first step is taken orthogonally to it
+    mirror: bool = False  # with sides = 2: the other half is the image of the first, `problem.image(u)`
 
 
 class Spectrum(NamedTuple):

@@ -85,7 +85,9 @@ def _special(settings: Settings, point: Point, found: Found, label: str) -> Spec
         label=label,
         params=dict(zip(problem.parameters, point.params.tolist())),
         solution=problem.view(point.u, point.params),
-        multipliers=point.spectrum.values,
+        multipliers=_whole(problem, point.spectrum.values),
+        half_multipliers=point.spectrum.values if getattr(problem, "halved", False) else None,
+        breaking=True if found.breaking else None,
         bracket=found.bracket,
         free=settings.name,
         u=point.u,
@@ -95,6 +97,11 @@ def _special(settings: Settings, point: Point, found: Found, label: str) -> Spec
         accuracy=found.accuracy,
         name=found.name,
     )
+
+
+def _whole(problem: Any, values: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Multipliers of the whole period, also where an orbit is solved on half of it."""
+    return values**2 if getattr(problem, "halved", False) else values
 
 
 def _verdict(entry: Entry) -> Verdict:
@@ -111,7 +118,7 @@ def _verdict(entry: Entry) -> Verdict:
 def _resume_data(follower: Follower | None) -> dict[str, Any] | None:
     if follower is None:
         return None
-    return {"length": float(follower.length), "since_adapt": follower.since_adapt}
+    return {"length": float(follower.length), "since_adapt": follower.since_adapt, "mirrored": follower.mirrored}
 
 
 def assemble(
@@ -135,8 +142,11 @@ def assemble(
         mesh_of.append(order[key])
     width = max((p.spectrum.values.size for p in points), default=0)
     values = np.full((len(points), width), np.nan, dtype=complex)
-    for row, p in zip(values, points):
-        row[: p.spectrum.values.size] = p.spectrum.values
+    halves = values.copy() if any(getattr(p.problem, "halved", False) for p in points) else None
+    for i, p in enumerate(points):
+        values[i, : p.spectrum.values.size] = _whole(p.problem, p.spectrum.values)
+        if halves is not None:
+            halves[i, : p.spectrum.values.size] = p.spectrum.values
     first = points[0]
     s0 = first.s
     method = {
@@ -165,6 +175,7 @@ def assemble(
         mesh_of=np.array(mesh_of),
         params=dict(zip(first.problem.parameters, first.params.tolist())),
         values=values,
+        half_values=halves,
         value_errors=np.array([p.spectrum.error for p in points]),
         verdicts=tuple(_verdict(e) for e in entries),
         residuals=np.array([p.residual for p in points]),
@@ -199,7 +210,8 @@ def _entry_from(branch: Branch, i: int, settings: Settings) -> Entry:
     if mark < 0:
         return Entry(point, None)
     special = branch.special[mark]
-    return Entry(point, Found(point, special.kind, special.bracket, special.accuracy, special.name))
+    breaking = bool(special.breaking)
+    return Entry(point, Found(point, special.kind, special.bracket, special.accuracy, special.name, breaking))
 
 
 def _restarted(branch: Branch, settings: Settings, end: int) -> Follower | None:
@@ -228,7 +240,8 @@ def _restarted(branch: Branch, settings: Settings, end: int) -> Follower | None:
     other = _point_from(branch, 0 if end else len(branch) - 1, settings, 0.0, sign)
     return Follower(
         settings, last, before=before, length=float(resume["length"]), since_adapt=int(resume["since_adapt"]),
-        home=Home(other), rate=float(np.nanmax(np.abs(branch.values), initial=0.0)),
+        home=Home(other), mirrored=bool(resume.get("mirrored", False)),
+        rate=float(np.nanmax(np.abs(branch.values), initial=0.0)),
     )
 
 

@@ -22,6 +22,7 @@ from ..results.branch import Branch
 from ..words import Kind, Status
 from .assembly import assemble, resumed
 from .follower import Entry, Follower
+from .images import with_images
 from .locating import Found
 from .points import Point, dot, make_point, smooth_tests, tangent_of
 from .settings import Settings, checked
@@ -214,6 +215,8 @@ def _with_tangent(
 
 # ---------------------------------------------------------------------- born at a special point
 def _from_seed(seed: Seed, settings: Settings) -> Branch:
+    if settings.events:
+        seed = seed._replace(mirror=False)  # a user's function need not have the symmetry
     birth, (ahead, behind) = _sides(seed, settings)
     if ahead is not None:
         ahead.run()
@@ -228,7 +231,10 @@ def _from_seed(seed: Seed, settings: Settings) -> Branch:
             "the point may be degenerate, or its branch may lie outside the window", last=birth.u,
         )
     two = seed.sides == 2
-    mark = Found(birth, seed.kind, (birth.parameter, birth.parameter), 0.0) if two else None
+    mark = Found(birth, seed.kind, (birth.parameter, birth.parameter), 0.0, "", seed.mirror) if two else None
+    if seed.mirror and ahead is not None:
+        entries, status = with_images(Entry(birth, mark), ahead)
+        return assemble(settings, entries, (status, status), (ahead, ahead))
     entries = [Entry(birth, mark), *(ahead.entries if ahead else [])]
     if behind is not None:
         entries = [_turned(e) for e in reversed(behind.entries)] + entries
@@ -276,8 +282,8 @@ def _sides(seed: Seed, settings: Settings) -> tuple[Point, tuple[Follower | None
     tests = smooth_tests(spectrum.values, problem.critical.circle)
     birth = Point(problem, seed.u, params, at, tangent, spectrum, tests, 0, 0.0, 0, 0.0, 0.0)
     ahead = _first_step(seed, birth, settings, 1.0)
-    behind = _first_step(seed, birth, settings, -1.0) if seed.sides == 2 else None
-    if ahead is None and seed.sides == 1:
+    behind = _first_step(seed, birth, settings, -1.0) if seed.sides == 2 and not seed.mirror else None
+    if ahead is None and (seed.sides == 1 or seed.mirror):
         ahead = _first_step(seed, birth, settings, -1.0)
     return birth, (ahead, behind)
 
@@ -304,7 +310,7 @@ def _first_step(seed: Seed, birth: Point, settings: Settings, side: float) -> Fo
         found = problem.correct(birth.u + h * t.u, params, settings.name, normal, 0.0, settings.tolerance)
         point = _first_accepted(birth, t, found, settings, h)
         if point is not None:
-            follower = Follower(settings, point, length=2 * point.step, mirrored=seed.sides == 1)
+            follower = Follower(settings, point, length=2 * point.step, mirrored=seed.sides == 1 or seed.mirror)
             follower.entries.append(Entry(point, None))
             follower._adapt()
             return follower

@@ -6,21 +6,28 @@ branch has yet are looked for by deflated Newton iteration: with the known solut
     M(u) F(u) = 0,   M(u) = prod_k (1 + 1 / |u - u_k|^2),      step = tau step_Newton,  tau = 1 / (1 - M'(step)/M),
 
 (norm of the problem), which cannot go to a known one. Every solution found is followed to both sides, and belongs from
-then on to the known ones. A search from finitely many guesses: what is found is there, what is not found may be.
+then on to the known ones, and so do its images S x(t - sigma T) under the symmetries of the system. Harmonic
+balance of polynomial equations gives all solutions with one harmonic as guesses (problems/harmonic_roots); `through`
+another parameter, a forcing amplitude for example, known solutions are continued at those values, and every new
+crossing of the nominal value is a solution too. A search from finitely many guesses: what is found is there, what is
+not found may be.
 
 Reference: Farrell, Birkisson, Funke (2015), SIAM J. Sci. Comput. 37, A2026-A2045.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, InputError
+from ..errors import ConvergenceError, InputError, check_names
 from ..protocols import Problem
 from ..results.branch import Branch
 from .driver import continuation
@@ -40,6 +47,8 @@ def families(
     *,
     places: int = 5,
     sizes: tuple[float, ...] = (0.5, 2.0, 8.0),
+    merge: bool = True,
+    through: Mapping[str, tuple[float, float]] | None = None,
     **options: Any,
 ) -> tuple[Branch, ...]:
     """All branches that starts at both ends of the window and a search between them find.
@@ -56,13 +65,20 @@ def families(
         Number of values of lambda, inside the window, at which more solutions are looked for.
     sizes : tuple of float
         Sizes of the guesses, relative to the largest known solution's states there.
+    merge : bool
+        Branches that are images of each other under a symmetry of the system (``system.symmetries``) are listed once;
+        False lists them all.
+    through : mapping of parameter name -> (from, to), optional
+        Amplitude continuation: at each of the places the known solutions are continued in these parameters too (a
+        forcing amplitude), and followed in `name` from every new solution at the nominal value.
     **options
         Passed on to `continuation`.
 
     Returns
     -------
     tuple of Branch
-        In the order found; the first starts at `from`. Branches that were met from two sides are listed once.
+        In the order found; the first starts at `from`. Branches that were met from two sides are listed once, and so
+        are those that are mirror images of one another.
 
     Raises
     ------
@@ -88,12 +104,16 @@ def families(
         raise InputError("a problem born at a special point is one branch: give it to continuation")
     if not isinstance(places, int) or places < 0:
         raise InputError(f"places must be a whole number >= 0, got {places!r}")
+    check_names("parameter", through or {}, list(problem.parameters), "this problem")
+    if name in (through or {}):
+        raise InputError(f"through = {name!r} is the continued parameter itself: give another one, a forcing amplitude")
     first, last = (float(v) for v in window)
+    search = _Search(problem, name, _mirrors(problem, name) if merge else ())
     found: list[Branch] = []
     trouble: ConvergenceError | None = None
     for ends in ((first, last), (last, first)):
         try:
-            if found and not _is_new(problem, name, ends[0], options.get("start"), found):
+            if found and not search.is_new(ends[0], options.get("start"), found):
                 continue
             found.append(continuation(problem, name, ends, **options))
         except ConvergenceError as error:
@@ -101,7 +121,8 @@ def families(
     searchable = not getattr(problem, "own", 0)
     for k in range(places if searchable else 0):
         value = first + (last - first) * (k + 0.5) / places
-        for solution in _new_solutions(problem, name, value, found, sizes):
+        across = (search.across(value, found, *item, options) for item in (through or {}).items())
+        for solution in chain(search.solutions(value, found, sizes), *across):
             try:
                 found.append(continuation(problem, name, (first, last), **{**options, "start": solution}))
             except ConvergenceError as error:
@@ -112,27 +133,102 @@ def families(
 
 
 # ---------------------------------------------------------------------- what is known
-def _params_at(problem: Problem, name: str, value: float) -> Array:
-    params = np.array(list(problem.parameters.values()), dtype=float)
-    params[list(problem.parameters).index(name)] = value
-    return params
+def _mirrors(problem: Any, name: str) -> tuple[Any, ...]:
+    """The symmetries of the system that the continued parameter leaves."""
+    system = getattr(problem, "system", None)
+    found = () if system is None else getattr(system, "symmetries", ())
+    declared = set(getattr(system, "declared_symmetries", ()))
+    return tuple(s for s in found if name not in s.fixed and (s.proved or s in declared))
 
 
-def _known(found: list[Branch], name: str, value: float) -> list[Any]:
-    """All solutions of the branches at a value of the parameter."""
-    solutions: list[Any] = []
-    for branch in found:
-        try:
-            solutions += branch.at(**{name: value})
-        except ConvergenceError:
-            continue
-    return solutions
+@dataclass(frozen=True, eq=False)
+class _Image:
+    """S x(t - lag) of an orbit x(t), as a guess and to be compared with others."""
+
+    orbit: Any
+    symmetry: Any
+    lag: float
+
+    def __call__(self, t: Any) -> Array:
+        return np.asarray(self.symmetry.matrix @ self.orbit(np.asarray(t) - self.lag))
+
+    @property
+    def period(self) -> float:
+        return float(self.orbit.period)
 
 
-def _is_new(problem: Problem, name: str, value: float, start: Any, found: list[Branch]) -> bool:
-    params = _params_at(problem, name, value)
-    solution = problem.view(problem.start(params, start), params)
-    return all(_distance(problem, solution, other) > _SAME for other in _known(found, name, value))
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """A search for solutions of one problem along one parameter, up to symmetries."""
+
+    problem: Any
+    name: str
+    mirrors: tuple[Any, ...]
+
+    def params_at(self, value: float) -> Array:
+        params = np.array(list(self.problem.parameters.values()), dtype=float)
+        params[list(self.problem.parameters).index(self.name)] = value
+        return params
+
+    def known(self, found: list[Branch], value: float) -> list[Any]:
+        """All solutions of the branches at a value of the parameter."""
+        solutions: list[Any] = []
+        for branch in found:
+            try:
+                solutions += branch.at(**{self.name: value})
+            except ConvergenceError:
+                continue
+        return solutions
+
+    def images(self, solution: Any) -> list[Any]:
+        """A solution and its images."""
+        if not callable(solution):
+            moved = [s.matrix @ solution.x for s in self.mirrors]
+            return [solution, *(dataclasses.replace(solution, x=x) for x in moved)]
+        T = solution.period / _turns(self.problem)
+        return [solution, *(_Image(solution, s, s.shift * T) for s in self.mirrors)]
+
+    def is_new(self, value: float, start: Any, found: list[Branch]) -> bool:
+        params = self.params_at(value)
+        solution = self.problem.view(self.problem.start(params, start), params)
+        return self.differs(solution, self.known(found, value))
+
+    def differs(self, solution: Any, known: list[Any]) -> bool:
+        """Whether a solution is none of the known ones, nor an image of one."""
+        others = [image for other in known for image in self.images(other)]
+        return all(_distance(self.problem, solution, other) > _SAME for other in others)
+
+    def solutions(self, value: float, found: list[Branch], sizes: tuple[float, ...]) -> Iterator[Any]:
+        """Solutions at a value that are on none of the branches; `found` grows while this runs."""
+        problem, params = self.problem, self.params_at(value)
+        for guess in list(_guesses(problem, params, self.known(found, value), sizes)):
+            known = self.known(found, value)
+            images = [image for other in known for image in self.images(other)]
+            others = [u for u in (_unknowns(problem, params, s) for s in images) if u is not None]
+            u = _deflated(problem, params, guess, others)
+            if u is None:
+                continue
+            corrected = problem.correct(u, params, self.name, None, 0.0, 1e-9)
+            if not corrected.converged:
+                continue
+            solution = problem.view(corrected.u, params)
+            if self.differs(solution, known):
+                yield solution
+
+    def across(
+        self, value: float, found: list[Branch], other: str, window: tuple[float, float], options: dict[str, Any]
+    ) -> Iterator[Any]:
+        """New solutions at a value where branches in `other` cross its nominal value; `found` grows while this runs."""
+        nominal = float(self.problem.parameters[other])
+        there = dataclasses.replace(self.problem, system=self.problem.system.with_params(**{self.name: value}))
+        for known in self.known(found, value):
+            try:
+                crossings = continuation(there, other, window, **{**options, "start": known}).at(**{other: nominal})
+            except ConvergenceError:
+                continue
+            for solution in crossings:
+                if self.differs(solution, self.known(found, value)):
+                    yield solution
 
 
 def _distance(problem: Problem, one: Any, other: Any) -> float:
@@ -153,26 +249,6 @@ def _turns(problem: Problem) -> int:
 
 
 # ---------------------------------------------------------------------- what is new
-def _new_solutions(
-    problem: Problem, name: str, value: float, found: list[Branch], sizes: tuple[float, ...]
-) -> Iterator[Any]:
-    """Solutions at a value that are on none of the branches; `found` grows while this runs."""
-    params = _params_at(problem, name, value)
-    known = _known(found, name, value)
-    for guess in list(_guesses(problem, params, known, sizes)):
-        known = _known(found, name, value)
-        others = [u for u in (_unknowns(problem, params, s) for s in known) if u is not None]
-        u = _deflated(problem, params, guess, others)
-        if u is None:
-            continue
-        corrected = problem.correct(u, params, name, None, 0.0, 1e-9)
-        if not corrected.converged:
-            continue
-        solution = problem.view(corrected.u, params)
-        if all(_distance(problem, solution, other) > _SAME for other in known):
-            yield solution
-
-
 def _unknowns(problem: Problem, params: Array, solution: Any) -> Array | None:
     try:
         return problem.start(params, solution)
@@ -181,7 +257,11 @@ def _unknowns(problem: Problem, params: Array, solution: Any) -> Array | None:
 
 
 def _guesses(problem: Any, params: Array, known: list[Any], sizes: tuple[float, ...]) -> Iterator[Array]:
-    """Equilibria: random states; orbits: the largest known one plus a harmonic of the motion's own period."""
+    """The problem's own candidates; then equilibria: random states, orbits: the largest known one plus a harmonic of
+    the motion's own period.
+    """
+    if hasattr(problem, "candidates"):
+        yield from problem.candidates(params)
     if not hasattr(problem, "discretise"):
         n = len(problem.weights)
         size = max((float(np.abs(s.x).max()) for s in known), default=0.0) or 1.0

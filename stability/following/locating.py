@@ -24,7 +24,7 @@ from ..words import Kind
 from .events import Changes, changes, supported
 from .points import Point, dot, make_point, smooth_tests, tangent_of
 
-__all__ = ["Found", "Locator", "hermite"]
+__all__ = ["Found", "Locator", "hermite", "shown"]
 
 Array = NDArray[np.float64]
 _PAIRS = (Kind.HOPF, Kind.NEIMARK_SACKER)
@@ -36,13 +36,24 @@ _SIGNATURE = 1e-5  # how close to the limit the critical value of a located poin
 
 
 class Found(NamedTuple):
-    """A located event: its point, its kind, the parameter values that bracket it, the Newton accuracy, a name."""
+    """A located event: its point, its kind, the parameter values that bracket it, the Newton accuracy, a name.
+
+    breaking: a branch point at which the orbits' symmetry is lost, located as a -1 of the half-period map.
+    """
 
     point: Point
     kind: Kind
     bracket: tuple[float, float]
     accuracy: float
     name: str = ""
+    breaking: bool = False
+
+
+def shown(found: Found) -> Found:
+    """As the whole orbit sees it: -1 of the half-period map of a symmetric orbit is a +1, a branch point."""
+    if found.kind is Kind.PERIOD_DOUBLING and getattr(found.point.problem, "halved", False):
+        return found._replace(kind=Kind.BRANCH_POINT, breaking=True)
+    return found
 
 
 def hermite(a: Point, b: Point, x: float) -> tuple[Array, float]:

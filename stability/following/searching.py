@@ -17,7 +17,7 @@ import numpy as np
 
 from ..words import Kind
 from .events import crossed, dip_of, double_turn, matched_growth, supported
-from .locating import Found, Locator
+from .locating import Found, Locator, shown
 from .points import Point
 
 __all__ = ["between", "hopped"]
@@ -59,7 +59,7 @@ def between(
     found: list[Found] = []
     for knots in (behind if len(behind) > 2 else [], here):
         for p, q in pairwise(knots):
-            found += locator.resolve(p, q)
+            found += [shown(f) for f in locator.resolve(p, q)]
     return found, doubtful and not found
 
 

@@ -47,7 +47,7 @@ def breaks_symmetry(point: Any) -> bool:
 
 
 def pitchfork(point: Any) -> Seed | None:
-    """The seed of the branch born at a symmetry-breaking point, followed on one side; None at any other branch point."""
+    """The seed of the branch born at a symmetry-breaking point; None at any other branch point."""
     params, free = point.params_vector, point.free
     if point.defining_kind is Kind.PERIOD_DOUBLING:
         return _seed(point.problem, np.array(point.u), params, free)

@@ -165,20 +165,6 @@ class Collocation(OrbitDiscretisation):
         """x(P) - x(0) of the whole orbit (n,)."""
         return np.asarray(self.closure @ self.winding + self.winding if self.halved else self.winding)
 
-    def start(self, params: Array, guess: Any = None) -> Array:
-        """A converged u from a guess, see `OrbitDiscretisation.start`; refuses values that break the symmetry."""
-        for name in self.symmetry.fixed if self.halved else ():
-            self.check_free(name, float(params[self.index(name)]))
-        return super().start(params, guess)
-
-    def check_free(self, name: str, value: float = np.nan) -> None:
-        """InputError for a parameter that must stay where the system has it, or the symmetry is lost."""
-        if self.halved and name in self.symmetry.fixed and value != self.system.parameters[name]:
-            raise InputError(
-                f"'{name}' breaks the symmetry {self.symmetry!r}: with it the orbit is to be solved on its whole "
-                "period, symmetry=None"
-            )
-
     # ------------------------------------------------------------------ what the problem is
     mesh: OrbitMesh = field(init=False, repr=False)
     span: float = field(init=False, repr=False)

@@ -222,7 +222,7 @@ def symmetric_doubled(problem: Collocation, u: Array, params: Array, vector: Arr
 
 
 # ---------------------------------------------------------------------- images of a discrete solution
-def mirrored_problem(problem: Collocation) -> Collocation:
+def mirrored_problem(problem: Any) -> Any:
     """The problem whose unknowns are the images of this one's (see `Collocation.mirror`)."""
     mirror: Mirror = problem.mirror
     edges, S = problem.mesh.edges, mirror.symmetry.matrix
@@ -233,7 +233,7 @@ def mirrored_problem(problem: Collocation) -> Collocation:
     return dataclasses.replace(problem, edges=edges, scales=np.abs(S) @ problem.scales, _memo={})
 
 
-def mirrored(problem: Collocation, u: Array) -> Array:
+def mirrored(problem: Any, u: Array) -> Array:
     """The image of unknowns, or of a direction in them, in the layout of `mirrored_problem`."""
     mirror: Mirror = problem.mirror
     mesh, S = problem.mesh, mirror.symmetry.matrix
@@ -246,6 +246,6 @@ def mirrored(problem: Collocation, u: Array) -> Array:
     return mesh.join(nodes, stages, rest)
 
 
-def _middle(problem: Collocation) -> int:
+def _middle(problem: Any) -> int:
     """The knot at s = 1/2, which the mesh of such a problem has."""
     return int(np.argmin(np.abs(problem.mesh.edges - 0.5)))

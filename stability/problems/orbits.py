@@ -21,6 +21,7 @@ from ..results.solutions import PeriodicOrbit
 from ..words import Kind
 from .orbit_measures import orbit_measures, orbit_view
 from .orbit_starts import discretised, started
+from .orbit_symmetry import mirrored, mirrored_problem
 
 __all__ = ["OrbitDiscretisation", "whole_number", "winding_vector"]
 
@@ -60,6 +61,8 @@ class OrbitDiscretisation:
     multiple: int
     winding: Any
     halved = False
+    symmetry: Any = None
+    mirror: Any = None  # how a family that has lost a symmetry is mapped to its image (see `orbit_symmetry.Mirror`)
     if TYPE_CHECKING:  # what the two add
         correct: Any
         linearise: Any
@@ -123,7 +126,25 @@ class OrbitDiscretisation:
     # ------------------------------------------------------------------ starts and results
     def start(self, params: Array, guess: Any = None) -> Array:
         """A converged u from a guess (see `orbit_starts`), or an error that says which guess to give."""
+        for name in self.symmetry.fixed if self.halved else ():
+            self.check_free(name, float(params[self.index(name)]))
         return started(self, np.asarray(params, float), guess)
+
+    def check_free(self, name: str, value: float = np.nan) -> None:
+        """InputError for a parameter that must stay where the system has it, or the symmetry is lost."""
+        if self.halved and name in self.symmetry.fixed and value != self.parameters[name]:
+            raise InputError(
+                f"'{name}' breaks the symmetry {self.symmetry!r}: with it the orbit is to be solved on its whole "
+                "period, symmetry=None"
+            )
+
+    def image_problem(self) -> Any:
+        """The problem whose unknowns are the images of this one's, where there is a `mirror`."""
+        return mirrored_problem(self)
+
+    def image(self, u: Array) -> Array:
+        """The image of unknowns or of a direction, in the layout of `image_problem`."""
+        return mirrored(self, u)
 
     def seed(self) -> Seed | None:
         """None: not born at a special point."""

@@ -26,6 +26,7 @@ from ..protocols import OrbitProblem, Seed
 from ..results.revival import revive
 from ..results.special import SpecialPoint
 from ..words import Kind
+from .breaking import pitchfork
 
 __all__ = ["Born", "null_directions", "switch"]
 
@@ -55,6 +56,7 @@ class Born:
         seed = self.first
         fields: dict[str, Any] = {k: np.asarray(getattr(seed, k)).tolist() for k in ("u", "params", "tangent")}
         fields |= {"parameter": seed.parameter, "sides": seed.sides, "kind": str(seed.kind), "free": seed.free}
+        fields["mirror"] = seed.mirror
         avoid = None if seed.avoid is None else [seed.avoid[0].tolist(), seed.avoid[1]]
         return {"problem": "Born", "inner": dict(self.inner.spec), "seed": {**fields, "avoid": avoid}}
 
@@ -83,7 +85,8 @@ def switch(point: SpecialPoint) -> Born:
     Returns
     -------
     Born
-        A branch point gives both halves of the crossing branch, joined; a Hopf point the periodic orbits (by
+        A branch point gives both halves of the crossing branch, joined (where they are images of each other under a
+        symmetry of the system, ``point.symmetry_breaking``, the second is written down from the first); a Hopf point the periodic orbits (by
         `Collocation`); a period doubling the orbits of twice the period; a grazing point the orbits with one impact
         more, or one less.
 
@@ -103,7 +106,8 @@ def switch(point: SpecialPoint) -> Born:
     if not isinstance(point, SpecialPoint):
         raise InputError(f"switch needs a special point such as branch['BP1'], got {type(point).__name__}")
     if point.kind is Kind.BRANCH_POINT:
-        return _crossing_branch(point)
+        seed = pitchfork(point)
+        return _crossing_branch(point) if seed is None else Born(seed.problem, seed)
     if point.kind is Kind.HOPF:
         return _orbits(point)
     if point.kind is Kind.PERIOD_DOUBLING:

@@ -93,6 +93,8 @@ class Branch:
     meshes : tuple of problems (or their specs, after `load`);  mesh_of : (P,) which of them a point belongs to
     params : mapping of all parameter values at the first point
     values : (P, n) complex, multipliers (orbits) or eigenvalues (equilibria);  value_errors : (P,)
+    half_values : (P, n) complex or None, of the half-period map where orbits were solved on half of their period (their
+        squares are `values`)
     verdicts : tuple of Verdict, one per point
     residuals : (P,);  iterations : (P,);  marks : (P,) index into `special`, -1 for an ordinary point
     special : tuple of SpecialPoint
@@ -118,6 +120,7 @@ class Branch:
     special: tuple[SpecialPoint, ...]
     statuses: tuple[Status, Status]
     method: Mapping[str, Any]
+    half_values: NDArray[np.complex128] | None = None
     stored_columns: Mapping[str, Array] | None = field(default=None, repr=False)
     stored_errors: Array | None = field(default=None, repr=False)
 
@@ -127,6 +130,8 @@ class Branch:
         for key in ("mesh_of", "iterations", "marks"):
             object.__setattr__(self, key, frozen(getattr(self, key), np.int64))
         object.__setattr__(self, "values", frozen(self.values, complex))
+        if self.half_values is not None:
+            object.__setattr__(self, "half_values", frozen(self.half_values, complex))
         object.__setattr__(self, "verdicts", tuple(Verdict(v) for v in self.verdicts))
         object.__setattr__(self, "statuses", tuple(Status(s) for s in self.statuses))
         object.__setattr__(self, "params", MappingProxyType(dict(self.params)))
@@ -340,6 +345,7 @@ class Branch:
         arrays = {key: getattr(self, key) for key in (*_PER_POINT, "mesh_of")}
         arrays |= {"sizes": np.array(sizes), "unknowns": np.concatenate(self.unknowns)}
         arrays |= {"tangents": np.concatenate(self.tangents), "error": self.error}
+        arrays |= {} if self.half_values is None else {"half_values": self.half_values}
         arrays |= {f"column.{k}": self.columns[n] for k, n in enumerate(names)}
         arrays |= {f"special.{k}.{n}": a for k, p in enumerate(points) for n, a in p[1].items()}
         return header, arrays
@@ -368,6 +374,7 @@ class Branch:
             method=header["method"],
             stored_columns={n: frozen(arrays[f"column.{k}"]) for k, n in enumerate(header["columns"])},
             stored_errors=arrays["error"],
+            half_values=arrays.get("half_values"),
             **{key: arrays[key] for key in _PER_POINT},
         )
 

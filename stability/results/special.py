@@ -38,6 +38,8 @@ class SpecialPoint:
     params : mapping of all parameter values
     solution : FixedPoint or PeriodicOrbit
     multipliers : (n,) complex, multipliers of an orbit or eigenvalues of an equilibrium
+    half_multipliers : (n,) complex or None, of the half-period map of an orbit solved on half of its period: -1 at the
+        loss of its symmetry; `multipliers` are their squares
     bracket : (float, float), values of the continued parameter at the points between which it was found
     accuracy : float, last Newton update in the scaled norm (the error left is about its square)
     criticality : Criticality or None;  coefficient : float or None, of the normal form (computed when first asked for)
@@ -59,6 +61,8 @@ class SpecialPoint:
     source: Any = field(repr=False)  # the problem, or its spec after `load`
     accuracy: float = 0.0
     name: str = ""
+    half_multipliers: NDArray[np.complex128] | None = None
+    breaking: bool | None = field(default=None, repr=False)  # None: not looked at yet
     normal: tuple[float | None, Criticality | None] | None = field(default=None, repr=False)  # None: not computed yet
 
     def __post_init__(self) -> None:
@@ -66,6 +70,8 @@ class SpecialPoint:
         object.__setattr__(self, "params", MappingProxyType({k: float(v) for k, v in self.params.items()}))
         for key, dtype in (("multipliers", complex), ("u", float), ("direction", float)):
             object.__setattr__(self, key, frozen(getattr(self, key), dtype))
+        if self.half_multipliers is not None:
+            object.__setattr__(self, "half_multipliers", frozen(self.half_multipliers, complex))
         low, high = self.bracket
         object.__setattr__(self, "bracket", (float(low), float(high)))
         if self.normal is not None:
@@ -83,6 +89,24 @@ class SpecialPoint:
         return self.multipliers
 
     @property
+    def critical_values(self) -> NDArray[np.complex128]:
+        """The values of the map on which the point was located: `half_multipliers` if there are any."""
+        return self.multipliers if self.half_multipliers is None else self.half_multipliers
+
+    @property
+    def defining_kind(self) -> Kind:
+        """The kind of the defining system: a symmetry-breaking point on half of a period is a simple -1 there."""
+        simple = self.half_multipliers is not None and self.kind is Kind.BRANCH_POINT and bool(self.breaking)
+        return Kind.PERIOD_DOUBLING if simple else self.kind
+
+    @cached_property
+    def symmetry_breaking(self) -> bool:
+        """Whether the branch that is born at this branch point loses a symmetry: two branches, images of each other."""
+        if self.breaking is None and self.kind is Kind.BRANCH_POINT:
+            return bool(import_module("stability.problems.breaking").breaks_symmetry(self))
+        return bool(self.breaking)
+
+    @property
     def params_vector(self) -> NDArray[np.float64]:
         """(m,) parameter values in the problem's order."""
         return np.array(list(self.params.values()))
@@ -92,7 +116,7 @@ class SpecialPoint:
         if self.normal is not None:
             return self.normal
         module = import_module("stability.problems.criticality")
-        return module.criticality_of(self.problem, self.kind, np.array(self.u), self.params_vector)  # type: ignore[no-any-return]
+        return module.criticality_of(self.problem, self.defining_kind, np.array(self.u), self.params_vector)  # type: ignore[no-any-return]
 
     @property
     def criticality(self) -> Criticality | None:
@@ -140,7 +164,8 @@ class SpecialPoint:
 
     def __repr__(self) -> str:
         named = f" '{self.name}'" if self.name else ""
-        tail = f" | {self.criticality}" if self.criticality else ""
+        words = ([str(self.criticality)] if self.criticality else []) + ["symmetry breaking"] * self.symmetry_breaking
+        tail = f" | {', '.join(words)}" if words else ""
         return f"{self.label} {self.kind}{named} at {self.free} = {self.params[self.free]:.10g}{tail}"
 
     def to_storage(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
@@ -155,12 +180,14 @@ class SpecialPoint:
             "rate": float(self.rate),
             "accuracy": float(self.accuracy),
             "name": self.name,
+            "breaking": self.symmetry_breaking,
             "criticality": None if self.criticality is None else str(self.criticality),
             "coefficient": self.coefficient,
             "source": dict(self.source if isinstance(self.source, Mapping) else self.source.spec),
             "solution": solution,
         }
         own = {"multipliers": self.multipliers, "u": self.u, "direction": self.direction}
+        own |= {} if self.half_multipliers is None else {"half_multipliers": self.half_multipliers}
         return header, own | {f"solution.{k}": a for k, a in arrays.items()}
 
     @classmethod
@@ -174,6 +201,7 @@ class SpecialPoint:
         solution = _SOLUTIONS[stored["type"]].from_storage(stored, inner)
         normal = (fields.pop("coefficient"), fields.pop("criticality"))
         own: dict[str, Any] = {k: arrays[k] for k in ("multipliers", "u", "direction")}
+        own["half_multipliers"] = arrays.get("half_multipliers")
         return cls(solution=solution, normal=normal, **own, **fields)
 
     def save(self, path: Any) -> None:
