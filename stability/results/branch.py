@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError, unknown_name
+from ..protocols import Tangent
 from ..words import Kind, Status, Verdict
 from .revival import revive
 from .solutions import frozen
@@ -235,14 +236,27 @@ class Branch:
 
     def _between(self, i: int, target: float) -> tuple[Any, Array, Array]:
         problem, params = self._problem(i), self._vector(i)
-        x = (target - self.parameter[i]) / (self.parameter[i + 1] - self.parameter[i])
-        params[list(problem.parameters).index(self.name)] = target
-        guesses = []
-        if self.mesh_of[i] == self.mesh_of[i + 1]:
-            guesses.append((1 - x) * self.unknowns[i] + x * self.unknowns[i + 1])
-        guesses.append(self.unknowns[i])
-        for guess in guesses:
-            found = problem.correct(guess, params, self.name, None, 0.0, float(self.method["tolerance"]))
+        index, h = list(problem.parameters).index(self.name), float(self.arclength[i + 1] - self.arclength[i])
+        on_both = self.mesh_of[i] == self.mesh_of[i + 1]
+        x = self._where(i, h, target)
+        cubic = np.array([x * x * (3 - 2 * x), h * x * (1 - x) ** 2, h * x * x * (x - 1)])
+        guess = self.unknowns[i] + h * x * self.tangents[i]
+        if on_both:
+            ends = self.unknowns[i + 1] - self.unknowns[i], self.tangents[i], self.tangents[i + 1]
+            guess = self.unknowns[i] + sum(c * v for c, v in zip(cubic, ends))
+        tolerance = float(self.method["tolerance"])
+        # Newton at a fixed value may leave for another part of the curve: the result has to lie near the cubic
+        params[index] = target
+        for start in (guess, self.unknowns[i]):
+            found = problem.correct(start, params, self.name, None, 0.0, tolerance)
+            far = np.sqrt((problem.weights * (found.u - guess) ** 2).sum()) if found.converged else np.inf
+            if far <= 0.5 * h:
+                return problem, found.u, found.params
+        weight = 1.0 / float(self.method["scale"])
+        tangent = Tangent(self.tangents[i], float(self.rates[i]), weight)
+        held = problem.correct(guess, params, self.name, tangent, 0.0, tolerance)
+        if held.converged:
+            found = problem.correct(held.u, params, self.name, None, 0.0, tolerance)
             if found.converged:
                 return problem, found.u, found.params
         raise ConvergenceError(
@@ -250,6 +264,13 @@ class Branch:
             f"{self.parameter[i + 1]:.10g}; ask for it during the continuation with at=({target:.10g},)",
             last=self.solution(i),
         )
+
+    def _where(self, i: int, h: float, target: float) -> float:
+        """x in (0, 1) at which the cubic through values and rates of both ends has the parameter value."""
+        p, q, r, s = self.parameter[i], self.parameter[i + 1], h * self.rates[i], h * self.rates[i + 1]
+        cubic = np.roots([2 * (p - q) + r + s, 3 * (q - p) - 2 * r - s, r, p - target])
+        inside = [float(x.real) for x in cubic if abs(x.imag) < 1e-9 and 0 < x.real < 1]
+        return inside[0] if len(inside) == 1 else float((target - p) / (q - p))
 
     def _problem(self, i: int) -> Any:
         return self._problems[self.mesh_of[i]]
