@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["first_samples", "polynomial_degree"]
+__all__ = ["equation_degrees", "first_samples", "polynomial_degree"]
 
 _FORCING = 2  # harmonics of the forcing allowed for in coefficients; more are found by measurement
 _UNKNOWN = 6
@@ -21,23 +21,27 @@ _HIGHEST = 12
 
 
 @lru_cache(maxsize=256)
-def _degree_of(rhs: Any, states: tuple[str, ...]) -> int | None:
+def _degrees_of(rhs: Any, states: tuple[str, ...]) -> tuple[int, ...] | None:
     import sympy as sp
 
     symbols = [sp.Symbol(name, real=True) for name in states]
-    degree = 1
+    degrees = []
     for expression in rhs:
         if not expression.is_polynomial(*symbols):
             return None
-        degree = max(degree, int(sp.Poly(expression, *symbols).total_degree()))
-    return degree
+        degrees.append(int(sp.Poly(expression, *symbols).total_degree()))
+    return tuple(degrees)
+
+
+def equation_degrees(system: Any) -> tuple[int, ...] | None:
+    """Total degree of every equation in the states; None where they are not polynomials (or a Python function)."""
+    return None if system.rhs is None else _degrees_of(system.rhs, tuple(system.states))
 
 
 def polynomial_degree(system: Any) -> int | None:
     """Total degree of the equations in the states; None where they are not polynomials (or a Python function)."""
-    if system.rhs is None:
-        return None
-    return _degree_of(system.rhs, tuple(system.states))
+    degrees = equation_degrees(system)
+    return None if degrees is None else max(1, *degrees)
 
 
 def first_samples(system: Any, harmonics: int, subharmonic: int, degree: int | None = None) -> int:
