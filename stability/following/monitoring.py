@@ -4,21 +4,16 @@ A problem may have ``monitors``, a tuple of (kind, function of a point), and ``c
 names a located zero or says that it is none (a pole, a neutral saddle). Zeros are found by Illinois iteration along the
 curve between neighbouring points, as for a user's events, instead of the driver's own events: such a curve has neither
 counts nor defining systems of its own. Where a function has an ``exact`` companion, that one is used to locate.
-
-``response(point)`` is the answer x (a vector) of the linearised curve to a fixed small change of its equations. It
-grows without bound where the curve branches and comes back from the other side: 1 / (x_a . x) changes sign between a
-and b there, where x_a is the answer at a. Problems without monitors cost nothing here.
+Where the curve itself branches, `crossings` finds. Problems without monitors cost nothing here.
 """
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
-
 from ..words import Kind
+from .crossings import crossing
 from .locating import Found, Locator
 from .points import Point
 
@@ -54,23 +49,15 @@ class Monitor:
         return found + self._crossings(locator, knots)
 
     def _crossings(self, locator: Locator, knots: list[Point]) -> list[Found]:
-        problem, found = knots[0].problem, []
-        response = getattr(problem, "response", None)
+        response, found = getattr(knots[0].problem, "response", None), []
         if response is None:
             return []
         answer = self._answer[1] if self._answer[0] is knots[0].u else response(knots[0])
         for p, q in pairwise(knots):
             after = response(q)
             if answer is not None and after is not None and float(answer @ after) < 0:
-                size = float(np.linalg.norm(answer))
-
-                def inverse(z: Point, before: Any = answer, size: float = size) -> float:
-                    x = response(z)
-                    product = math.nan if x is None else float(before @ x) / size
-                    return 1 / product if product else math.inf
-
-                ends = (1 / size, inverse(q))
-                found += _named(Kind.BRANCH_POINT, locator.zero(p, q, inverse, *ends), p, q, max(map(abs, ends)))
+                at = crossing(locator, p, q, answer, after)
+                found += [] if at is None else [at]
             answer = after
         self._answer = (knots[-1].u, answer)
         return found

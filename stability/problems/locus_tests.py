@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..words import Kind
-from .locus_newton import response, sharpened
+from .locus_newton import sharpened
 from .locus_system import ExtendedLinearisation
 
 if TYPE_CHECKING:
@@ -46,7 +46,6 @@ Complex = NDArray[np.complex128]
 _STILL = 1e-4  # scaled rate of both parameters at a cusp
 _NOISE = 1e-9  # a scaled rate below this is rounding: the parameter is constant along the curve
 _ASIDE = 1e-3  # arclength to the neighbours that tell the sign of a second derivative
-_GROWN = 1e3  # how much the answer to a change of the equations has grown where a curve branches
 
 
 class Rate:
@@ -105,9 +104,6 @@ def confirmed(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None
     """The kind of a located zero, or None: nothing. `scale`: largest modulus of the function at the bracket's ends."""
     if kind in (Kind.FOLD, Kind.EXTREMUM):
         return _extreme(curve, kind, sharpened(point), scale)
-    if kind is Kind.BRANCH_POINT:
-        answer = response(point)
-        return kind if answer is not None and float(np.linalg.norm(answer)) * scale > _GROWN else None
     function = dict(monitors(curve)).get(kind)
     if function is None:
         return kind
