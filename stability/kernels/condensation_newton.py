@@ -28,6 +28,7 @@ from stability.kernels.condensation_reduced import reduce_and_solve
 __all__ = ["CONVERGED", "NOT_FINITE", "NO_CONVERGENCE", "SINGULAR", "evaluate", "newton", "solvers"]
 
 CONVERGED, NO_CONVERGENCE, SINGULAR, NOT_FINITE = 0, 1, 2, 3
+STALLED, ROUNDING = 1e-6, 1e-12  # a correction that no longer falls, and a scaled residual that is rounding
 
 
 def _array(dimensions, dtype=types.float64, constant=False):  # type: ignore[no-untyped-def]
@@ -255,6 +256,10 @@ def newton(  # type: ignore[no-untyped-def]
         P[free] += damping * change_l
         if change <= tolerance * (1.0 + length):
             status = CONVERGED
+            break
+        stalled = change > 0.3 * previous and change <= STALLED * (1.0 + length)
+        if stalled and residual <= ROUNDING:
+            status = CONVERGED  # an ill-conditioned orbit, solved as far as its digits go
             break
         if arc == 1 and iterations > 1 and change > 2.0 * previous:
             break

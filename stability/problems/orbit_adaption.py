@@ -5,8 +5,9 @@ The error of the nodes goes like N^(-2m); the wanted `accuracy` gives the number
     N_new = N (safety . error / accuracy)^(1 / 2m),
 
 limited to a factor between 2/3 and 2, with a dead band so that the mesh rests while the error is between 1e-5 and 1
-times the accuracy. The intervals are placed by equidistribution (kernels/meshes.py) when the error per interval is
-uneven. Scales are the largest moduli of the states on the orbit, kept within a factor of 2 of them; those of an angle
+times the accuracy. Errors that are rounding, N eps |core^-1|, are left alone: an undamped orbit far up a resonance is
+known to few digits, and no mesh gives it more. The intervals are placed by equidistribution (kernels/meshes.py) when
+the error per interval is uneven. Scales are the largest moduli of the states on the orbit, kept within a factor of 2 of them; those of an angle
 do not fall below a small part of a radian, so that a branch that is born where a pendulum hangs still leaves at once.
 """
 
@@ -29,6 +30,7 @@ __all__ = ["adapted", "natural_sizes", "state_scales"]
 Array = np.ndarray
 _UNEVEN = 1.5  # largest share of the monitor over the mean share that is left alone
 _TINY = 1e-6
+_LOST = 30.0  # errors below so many times their rounding do not ask for more intervals
 _ANGLE = 0.02  # rad
 
 
@@ -74,6 +76,8 @@ def adapted(
     rho = monitor(mesh.edges, mesh.leading(nodes, stages) / scales, mesh.degree, breaks)
     share = rho * mesh.h
     count = _wanted_intervals(problem, error) if problem.adaptive else mesh.intervals
+    if count > mesh.intervals and error < _LOST * _rounding(problem, u, params):
+        count = mesh.intervals
     moved = any(np.abs(mesh.edges - b).min() > 1e-12 for b in breaks)
     uneven = problem.adaptive and error > 1e-2 * problem.accuracy and share.max() > _UNEVEN * share.mean()
     if not (rescale or moved or uneven or count != mesh.intervals):
@@ -86,6 +90,15 @@ def adapted(
         return new, mesh.transfer(new.mesh, u)[0], None
     moved_u, moved_t = mesh.transfer(new.mesh, u, tangent.u)
     return new, moved_u, Tangent(moved_t, tangent.parameter, tangent.weight)
+
+
+def _rounding(problem: Collocation, u: Array, params: Array) -> float:
+    """Error of the nodes that rounding of the equations makes, over the scales."""
+    L = problem.linearise(u, params)
+    if L.sign == 0.0 or not np.isfinite(L.core).all():
+        return 0.0
+    least = float(np.linalg.svd(L.core, compute_uv=False)[-1])
+    return problem.mesh.intervals * float(np.finfo(float).eps) / max(least, 1e-300)
 
 
 def _wanted_intervals(problem: Collocation, error: float) -> int:

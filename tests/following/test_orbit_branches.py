@@ -151,3 +151,16 @@ def test_stored_branch_goes_on(resonance: st.Branch, tmp_path: object) -> None:
         assert a.max["u"] == pytest.approx(b.max["u"], rel=1e-12)
     wider = again.extend(window=(0.3, 3.5))
     assert wider.parameter[-1] == 3.5 and wider.labels == again.labels
+
+
+def test_undamped_resonance_is_climbed_as_far_as_the_digits_go() -> None:
+    """xi = 0, beta = 0.05: no fold ends the climb along the third superharmonic resonance; both multipliers come so
+    close to 1 that Newton's update stops at rounding, and no mesh helps. Witness: shooting at the far end."""
+    system = st.models.duffing(xi=0.0, beta=0.05)
+    branch = st.continuation(st.Collocation(system), "Omega", (0.3, 3.0))
+    assert branch.status is st.Status.PARAMETER_BOUND and branch.labels == ()
+    assert max(p.mesh.intervals for p in branch.meshes) < 100
+    assert 1e-12 < branch.error[-1] < 1e-3  # said, not hidden
+    last = branch.solution(-1)
+    again = st.solve(st.Shooting(system, segments=5), start=last, Omega=3.0)
+    assert again.max["u"] == pytest.approx(last.max["u"], rel=1e-5)
