@@ -39,7 +39,7 @@ __all__ = ["Entry", "Follower"]
 Array = NDArray[np.float64]
 _ADAPT_EVERY = 3
 _GROWTH = 1e6
-_STALL_POINTS, _STALL, _STALL_LENGTH = 30, 1e-8, 0.05
+_STALL_POINTS, _STALL, _STALL_LENGTH = 8, 1e-8, 0.05
 _PATIENCE = 6
 
 
@@ -233,6 +233,9 @@ class Follower(Iterator[Point]):
     ) -> tuple[Point, Comparison] | float:
         last, settings = self.last, self.settings
         point = make_point(last.problem, found, tangent, settings.index, last.s, h)
+        if not np.isfinite(point.spectrum.values).all():
+            self.note = "multipliers or eigenvalues are not finite"
+            return 0.4
         seen = compare(last, point, guess, self._rate)
         point = point._replace(s=last.s + seen.distance, step=seen.distance)
         if seen.worst > 1 and not h < KINK * settings.steps.longest:

@@ -37,7 +37,7 @@ def eigenvalues(matrix: Array) -> Array:
     if matrix.shape == (2, 2):
         (a, b), (c, d) = matrix.tolist()
         half, det = (a + d) / 2, a * d - b * c
-        square = ((a - d) / 2) ** 2 + b * c
+        square = 0.25 * (a - d) * (a - d) + b * c  # a power would raise where this overflows
         if square >= 0:
             large = half + math.copysign(math.sqrt(square), half)
             return np.array([large, det / large if large else 0.0], complex)
