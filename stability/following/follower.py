@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, StabilityWarning
 from ..protocols import Corrected, Tangent
 from ..words import Kind, Status
+from .edges import Edge
 from .events import changes
 from .locating import Found, Locator
 from .loops import Home, collapsed
@@ -97,7 +98,7 @@ class Follower(Iterator[Point]):
         self._norm = self._norm_of(first)
         self._extent: list[tuple[float, float]] = []
         self._event_values = [_first_value(name, f, first) for name, f in settings.events]
-        self._monitor = Monitor(first)
+        self._monitor, self._edge = Monitor(first), Edge()
         self._seen: dict[str, int] = {}
 
     # ------------------------------------------------------------------ iteration
@@ -163,8 +164,14 @@ class Follower(Iterator[Point]):
                 continue
             if self._monitor.alone:
                 return *made, []
+            end = self._edge.reached(self.locator, self.before, self.last, made[0])
+            if isinstance(end, float):
+                h *= end
+                continue
+            if end is not None:
+                made = (end[1], made[1])
             found, doubtful = between(self.locator, self.before, self.last, made[0], self._twin)
-            found = [f for f in found if not self._known(f)]
+            found = [f for f in found if not self._known(f)] + ([end[0]] if end is not None else [])
             strange = any(f.kind is Kind.UNEXPLAINED for f in found)
             if not (strange or doubtful) or doubts >= _PATIENCE:
                 return *made, found
@@ -305,7 +312,7 @@ class Follower(Iterator[Point]):
             if returned:  # the two families cross there
                 one = one._replace(kind=Kind.BRANCH_POINT)
             self.entries.append(Entry(point, one._replace(point=point)))
-            if returned or self._named_stop(one):
+            if returned or self._named_stop(one) or one.kind is Kind.GRAZING:
                 self.status = Status.CLOSED_LOOP if returned else Status.STOPPED
                 self.note = "" if returned else f"at the {one.kind} that was to stop it"
                 self.before, self.last = None, point
