@@ -57,13 +57,15 @@ def _same(p: Point, q: Point) -> bool:
 
 def _invariants(point: Point) -> NDArray[np.float64]:
     """(k, 2) numbers of a solution that depend neither on its mesh nor on its phase: extrema of every state, period."""
+    measures = point.problem.measures(point.u, point.params)
+    states = [name[:-4] for name in measures if name.endswith(".max")]
+    if states and "period" in measures:
+        rows = [[measures[f"{s}.max"], measures[f"{s}.min"]] for s in states]
+        return np.array([*rows, [measures["period"], measures["period"]]])
     solution = point.problem.view(point.u, point.params)
-    if isinstance(solution, PeriodicOrbit):
-        rows = [[solution.max[s], solution.min[s]] for s in solution.states]
-        return np.array([*rows, [solution.period, solution.period]])
     if isinstance(solution, FixedPoint):
         return np.repeat(solution.x[:, None], 2, axis=1)
-    return np.repeat(np.array(list(point.problem.measures(point.u, point.params).values()))[:, None], 2, axis=1)
+    return np.repeat(np.array(list(measures.values()))[:, None], 2, axis=1)
 
 
 def collapsed(point: Point) -> bool:

@@ -207,7 +207,7 @@ class CollocationLinearisation:
     def _end(self, nodes: Array, stages: Array) -> Array:
         """The core equations of a variation that satisfies the inner ones: (k,)."""
         problem, D = self.problem, self.problem.scales
-        gap = np.linalg.solve(problem.closure, nodes[-1]) - nodes[0]
+        gap = problem.closure @ nodes[-1] - nodes[0]
         if not self.mesh.own:
             return np.asarray(gap / D)
         return np.append(gap / D, (self.phase_row * stages).sum())
@@ -278,7 +278,7 @@ class CollocationLinearisation:
         N, count, D = mesh.intervals, mesh.intervals * mesh.degree, problem.scales
         tau, amount = (float(v[n]) * self.period if own else 0.0), float(v[-1])
         _, V = self._variation(D * v[:n], tau, free, amount)
-        eta = np.linalg.solve(problem.closure.T, w[:n] / D)
+        eta = problem.closure.T @ (w[:n] / D)
         rho = self.phase_row * float(w[n]) if own else np.zeros((N, mesh.degree * n))
         A, h, sigma, J, kept, position, LU, pivots = self._factors()
         omega = adjoint_sweep(
