@@ -38,6 +38,8 @@ _EXPORTS: dict[str, str] = {
     "Kind": "words",
     "load": "results.storage",
     "load_model": "systems.textfile",
+    "load_response": "results.measured_files",
+    "MeasuredResponse": "results.measured",
     "mathieu_a": "floquet.mathieu",
     "mathieu_a_of_exponent": "floquet.exponents",
     "mathieu_b": "floquet.mathieu",

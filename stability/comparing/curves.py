@@ -21,6 +21,7 @@ from ..analytic.reconstructing import steady_extrema
 from ..errors import InputError, unknown_name
 from ..results.branch import Branch
 from ..results.comparison import distinct
+from ..results.measured import MeasuredResponse
 from ..results.sweep import Sweep
 from ..words import Kind, Verdict
 
@@ -161,6 +162,8 @@ def described(result: Any) -> str:
     if isinstance(result, Sweep):
         lo, hi = result.window
         return f"sweep {'up' if hi > lo else 'down'}"
+    if isinstance(result, MeasuredResponse):
+        return "measured"
     branch = result if isinstance(result, Branch) else result[0]
     problem = str(branch.method.get("problem", "branch"))
     if problem == "HarmonicBalance":

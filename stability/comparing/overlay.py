@@ -2,7 +2,8 @@
 
 At each value of the parameter all solutions of both methods are found by solving (not by interpolation), matched by
 verdict (`matching`), and compared in one quantity (`curves`); folds are matched in order. A sweep is compared with the
-stable solution of the reference that is nearest to it, at its own settled points.
+stable solution of the reference that is nearest to it, at its own settled points; a measured response likewise, and
+where it is the reference the others are read at its points.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..results.branch import Branch
 from ..results.comparison import Comparison, Difference, swept
+from ..results.measured import MeasuredResponse
 from ..results.sweep import Sweep
 from ..words import Verdict
 from .curves import Curves, default_quantity, described, unique
@@ -27,15 +29,15 @@ Array = NDArray[np.float64]
 
 
 def compare(
-    reference: Branch | Sequence[Branch], *others: Any, quantity: str | None = None, points: int = 81
+    reference: Branch | Sequence[Branch] | MeasuredResponse, *others: Any, quantity: str | None = None, points: int = 81
 ) -> Comparison:
     """Lay other results over a reference and say, in numbers, where they differ and what they miss.
 
     Parameters
     ----------
-    reference : Branch or sequence of Branch
+    reference : Branch, sequence of Branch, or MeasuredResponse
         The answer that the others are measured against.
-    *others : Branch, sequence of Branch, or Sweep
+    *others : Branch, sequence of Branch, Sweep, or MeasuredResponse
         Branches of any method (collocation, harmonic balance, the slow flow of averaging, ...) or sweeps, along the
         same parameter. Several branches of one method (what `families` returns) count together.
     quantity : str, optional
@@ -68,16 +70,20 @@ def compare(
     True
     """
     first = _several(reference)
-    if first is None:
+    measured = reference if isinstance(reference, MeasuredResponse) else None
+    if first is None and measured is None:
         raise InputError(f"the reference must be a Branch or several; got {type(reference).__name__}")
     if not others:
         raise InputError("give at least one result to compare with the reference")
     if not isinstance(points, int) or points < 2:
         raise InputError(f"points must be a whole number >= 2; got {points!r}")
     for other in others:
-        if _several(other) is None and not isinstance(other, Sweep):
-            raise InputError(f"cannot compare a {type(other).__name__}; give branches and sweeps")
+        if _several(other) is None and not isinstance(other, (Sweep, MeasuredResponse)):
+            raise InputError(f"cannot compare a {type(other).__name__}; give branches, sweeps, measured responses")
     names = unique([described(r) for r in (reference, *others)])
+    if measured is not None:
+        return against_measured(measured, others, names, quantity)
+    assert first is not None
     base = Curves(names[0], first, quantity or default_quantity(first[0]))
     found = {name: difference(base, name, other, points) for name, other in zip(names[1:], others)}
     return Comparison(
@@ -92,8 +98,11 @@ def difference(base: Curves, name: str, other: Any, points: int) -> Difference:
     own = other.name if branches is None else branches[0].name
     if own != base.parameter:
         raise InputError(f"'{name}' runs along {own}, the reference along {base.parameter}")
+    if isinstance(other, MeasuredResponse):
+        return _points_difference(name, base, other.parameter, other.values(base.quantity))
     if branches is None:
-        return _sweep_difference(name, base, other)
+        kept = other.settled
+        return _points_difference(name, base, other.parameter[kept], swept(other, base.quantity)[kept])
     return _branch_difference(name, base, Curves(name, branches, base.quantity), points)
 
 
@@ -129,12 +138,13 @@ def _branch_difference(name: str, base: Curves, other: Curves, points: int) -> D
     return _difference(name, matches, missing, extra, _folds(base.folds, other.folds))
 
 
-def _sweep_difference(name: str, base: Curves, sweep: Sweep) -> Difference:
-    values, (low, high) = swept(sweep, base.quantity), base.bounds
+def _points_difference(name: str, base: Curves, at: Array, values: Array) -> Difference:
+    """What was seen at single values of the parameter: each against the nearest solution that is not unstable."""
+    low, high = base.bounds
     matches: list[tuple[float, float, float, Verdict]] = []
     extra: list[tuple[float, Verdict, float]] = []
-    for value, seen, settled in zip(sweep.parameter.tolist(), values.tolist(), sweep.settled):
-        if not settled or not low <= value <= high:
+    for value, seen in zip(at.tolist(), values.tolist()):
+        if not low <= value <= high:
             continue
         here = [row for row in base.rows(value) if row[0] is not Verdict.UNSTABLE]
         if here:
@@ -143,6 +153,45 @@ def _sweep_difference(name: str, base: Curves, sweep: Sweep) -> Difference:
         else:
             extra.append((value, Verdict.STABLE, seen))
     return _difference(name, matches, [], extra, ())
+
+
+def against_measured(
+    measured: MeasuredResponse, others: Sequence[Any], names: Sequence[str], quantity: str | None
+) -> Comparison:
+    """Branches and sweeps against what was measured, at its points; a point that they do not have is missing."""
+    found: dict[str, Difference] = {}
+    if quantity is None:
+        branches = next((b for b in map(_several, others) if b is not None), None)
+        if branches is None:
+            raise InputError("which quantity? Give quantity='<state>.amplitude(1)' or '<state>.max'")
+        quantity = measured.quantity(tuple(branches[0].columns))
+    at, seen = measured.parameter, measured.values(quantity)
+    for name, other in zip(names[1:], others):
+        several = _several(other)
+        own = other.name if several is None else several[0].name
+        if own != measured.name:
+            raise InputError(f"'{name}' runs along {own}, the measured response along {measured.name}: rename it by "
+                             "load_response(file, names={...})")  # fmt: skip
+        if several is None:
+            turned = _interpolated(name, other, quantity, at, seen)
+        else:
+            turned = _points_difference(name, Curves(name, several, quantity), at, seen)
+        # the roles are the other way round: a point for which the method has no solution is missing
+        here, there = turned.value, turned.reference
+        found[name] = Difference(name, turned.parameter, here, there, turned.verdicts, turned.extra, ())
+    curves = (measured, *(drawn(quantity, other) for other in others))
+    return Comparison(names[0], quantity, measured.name, found, curves, tuple(names))
+
+
+def _interpolated(name: str, other: Sweep | MeasuredResponse, quantity: str, at: Array, seen: Array) -> Difference:
+    """Measured points inside the other's range against its values there, interpolated between its settled points."""
+    kept = other.settled if isinstance(other, Sweep) else np.ones(len(other), bool)
+    values = swept(other, quantity) if isinstance(other, Sweep) else other.values(quantity)
+    order = np.argsort(other.parameter[kept], kind="stable")
+    places, values = other.parameter[kept][order], values[kept][order]
+    inside = (at >= places.min(initial=np.inf)) & (at <= places.max(initial=-np.inf))
+    there = np.interp(at[inside], places, values) if inside.any() else np.zeros(0)
+    return Difference(name, at[inside], there, seen[inside], (Verdict.STABLE,) * int(inside.sum()), (), ())
 
 
 def _difference(name: str, matches: list[Any], missing: list[Any], extra: list[Any], folds: Any) -> Difference:

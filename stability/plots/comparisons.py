@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..results.comparison import swept
+from ..results.measured import MeasuredResponse
 from ..results.sweep import Sweep
 from .branches import plot_branch
+from .measurements import plot_measured
 from .style import COLOURS, SERIES, axis_label
 
 if TYPE_CHECKING:
@@ -16,7 +18,7 @@ __all__ = ["plot_comparison"]
 
 
 def plot_comparison(comparison: Comparison, ax: Any = None) -> list[Any]:
-    """Draw every compared branch and sweep; unstable parts dashed; special points of the reference only.
+    """Draw every compared branch, sweep and measured response; unstable parts dashed; special points of the reference only.
 
     Parameters
     ----------
@@ -36,6 +38,9 @@ def plot_comparison(comparison: Comparison, ax: Any = None) -> list[Any]:
     artists = []
     colours = [c for c in SERIES if c not in (COLOURS["black"], COLOURS["grey"])]
     for k, (name, curve) in enumerate(zip(comparison.names, comparison.curves)):
+        if isinstance(curve, MeasuredResponse):
+            artists += plot_measured(curve, ax=ax, y=comparison.quantity, label=name)
+            continue
         if isinstance(curve, Sweep):
             values = swept(curve, comparison.quantity)
             lo, hi = curve.window

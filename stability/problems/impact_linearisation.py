@@ -49,7 +49,8 @@ class Arcs:
     def failed(cls, count: int, n: int, m: int) -> Arcs:
         """All not finite."""
         shapes = ((count + 1,), (count, n), (count, n, n), (count, n, m), (count, n), (count, n))
-        return cls(*(np.full(shape, np.nan) for shape in shapes), np.nan)  # type: ignore[arg-type]
+        parts = [np.full(shape, np.nan) for shape in shapes]
+        return cls(parts[0], parts[1], parts[2], parts[3], parts[4], parts[5], np.nan)
 
 
 class ImpactLinearisation(ShootingLinearisation):

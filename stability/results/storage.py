@@ -39,6 +39,7 @@ _HOMES = {
     "stability-chart": "results.chart",
     "trajectory": "results.trajectory",
     "sweep": "results.sweep",
+    "measured-response": "results.measured",
     "basins": "results.basins",
     "difference": "results.comparison",
     "responses": "results.responses",
