@@ -10,14 +10,19 @@ loop. Any other half gives the branch  image reversed - birth - half.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
+from ..problems.breaking import regained
 from ..protocols import Tangent
 from ..words import Status
 from .follower import Entry, Follower
-from .points import Point
+from .points import Point, dot, smooth_tests
+from .settings import Settings
 
 __all__ = ["with_images"]
+
+_NEAR = 1e-4  # scaled distance between a pitchfork as it was met, a little unfolded, and as it is
 
 
 class _Images:
@@ -44,11 +49,32 @@ def with_images(birth: Entry, half: Follower) -> tuple[list[Entry], Status]:
     status, images = half.status or Status.STEP_TOO_SMALL, _Images()
     ends_in_pitchfork = status is Status.CLOSED_LOOP and half.entries and half.entries[-1].found is not None
     if ends_in_pitchfork:
-        end = half.entries[-1].point.s
+        last = _exactly(half.settings, half.entries[-1])
+        end = last.point.s
         back = [images.entry(e, 2 * end - e.point.s) for e in reversed(half.entries[:-1])]
         closing = Entry(birth.point._replace(s=2 * end), None)
-        return [birth, *half.entries, *back, closing], status
+        return [birth, *half.entries[:-1], last, *back, closing], status
     if status is Status.CLOSED_LOOP:  # it has come round by itself
         return [birth, *half.entries], status
     front = [images.entry(e, -e.point.s) for e in reversed(half.entries)]
     return [*front, birth, *half.entries], status
+
+
+def _exactly(settings: Settings, entry: Entry) -> Entry:
+    """The pitchfork at the end of a half, on a mesh that is the same in both halves of the period."""
+    point, found = entry
+    exact = regained(point.problem, point.u, point.params, settings.name, settings.weight)  # type: ignore[arg-type]
+    if exact is None or found is None:
+        return entry
+    problem, u, direction, params = exact
+    parameter = float(params[settings.index])
+    if abs(parameter - point.parameter) * settings.weight > _NEAR:
+        return entry
+    length = math.sqrt(dot(problem.weights, direction, direction))
+    tangent = Tangent(direction / length, 0.0, settings.weight)
+    spectrum = problem.spectrum(problem.linearise(u, params))
+    tests = smooth_tests(spectrum.values, True)
+    new = point._replace(
+        problem=problem, u=u, params=params, parameter=parameter, tangent=tangent, spectrum=spectrum, tests=tests
+    )
+    return Entry(new, found._replace(point=new, breaking=True))

@@ -3,7 +3,8 @@ r"""Pitchforks of symmetric orbits: which branch points break a symmetry, and th
 On half of a period (orbit_symmetry.py) such a point is a simple multiplier -1 of N. On the whole period it is a +1 with
 two crossing branches: the orbit has a symmetry, x(t + P/2) = S x(t) or x(t) = S x(t), that the new direction turns
 round. The discrete problem has the pitchfork up to its error only, since its mesh is not the same in both halves;
-therefore the point is located again on half of the period, as a -1, and the new branch starts from there.
+therefore the point is located again on half of the period, as a -1, and the new branch starts from there. In the same
+way the place is found where a branch without the symmetry gets it back.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from .collocation import Collocation
 from .defining import locate
 from .orbit_symmetry import Mirror, broken, on_half, turned
 
-__all__ = ["breaks_symmetry", "pitchfork"]
+__all__ = ["breaks_symmetry", "pitchfork", "regained"]
 
 Array = np.ndarray
 
@@ -65,9 +66,26 @@ def pitchfork(point: Any) -> Seed | None:
     return _seed(half, found.u, found.params, free) if found.converged else None
 
 
-def _seed(half: Collocation, u: Array, params: Array, free: str) -> Seed:
+def regained(
+    problem: Collocation, u: Array, params: Array, free: str, weight: float
+) -> tuple[Collocation, Array, Array, Array] | None:
+    """(problem, u, direction, params) where a family without the symmetry gets it back, exactly; None: not found."""
+    if not problem.mirror.fraction:
+        return None
+    half, start = on_half(problem, u, problem.mirror.symmetry)
+    found = locate(half, Kind.PERIOD_DOUBLING, start, params, free, weight, np.array([-1.0 + 0j]), radius=0.1)
+    if not found.converged:
+        return None
+    return (*broken(half, found.u, found.params, _critical(half, found.u, found.params)), found.params)
+
+
+def _critical(half: Collocation, u: Array, params: Array) -> Array:
+    """v of N v = -v."""
     M = half.linearise(u, params).spectral
-    vector = np.linalg.svd(M + np.eye(len(M)))[2][-1]
-    problem, whole, direction = broken(half, u, params, vector)
+    return np.asarray(np.linalg.svd(M + np.eye(len(M)))[2][-1])
+
+
+def _seed(half: Collocation, u: Array, params: Array, free: str) -> Seed:
+    problem, whole, direction = broken(half, u, params, _critical(half, u, params))
     mirrored = problem.mirror is not None
     return Seed(problem, whole, params, direction, 0.0, 2, Kind.BRANCH_POINT, free, None, mirrored)
