@@ -18,6 +18,8 @@ _EXPORTS: dict[str, str] = {
     "switch": "problems.switching",
     "solve": "following.driver",
     "continuation": "following.driver",
+    "steps": "following.driver",
+    "Walk": "following.walking",
     "Sensitivity": "results.sensitivity_table",
     "SpecialPoint": "results.special",
     "PeriodicOrbit": "results.solutions",

@@ -18,8 +18,9 @@ from .locating import Found
 from .loops import Home
 from .points import Point, dot, smooth_tests
 from .settings import Settings
+from .walking import Walk, ended
 
-__all__ = ["assemble", "resumed"]
+__all__ = ["assemble", "resumed", "turned"]
 
 Array = NDArray[np.float64]
 _MERGE = 1e-10
@@ -121,13 +122,21 @@ def _resume_data(follower: Follower | None) -> dict[str, Any] | None:
     return {"length": float(follower.length), "since_adapt": follower.since_adapt, "mirrored": follower.mirrored}
 
 
+def _note(follower: Follower | None) -> str:
+    """Why a side ended, in words."""
+    if follower is None:
+        return ""
+    return "not followed to its end yet" if follower.status is None else follower.note
+
+
 def assemble(
     settings: Settings,
     entries: list[Entry],
     statuses: tuple[Status, Status],
     ends: tuple[Follower | None, Follower | None],
+    notes: tuple[str, str] | None = None,
 ) -> Branch:
-    """The branch that these entries are."""
+    """The branch that these entries are; `notes` say why it ended on either side, by default what the followers say."""
     entries = _without_twins(_merged(entries))
     special, marks = _labelled(settings, entries)
     points = [e.point for e in entries]
@@ -159,6 +168,7 @@ def assemble(
         "circle": first.problem.critical.circle,
         "at": list(settings.at),
         "resume": [_resume_data(f) for f in ends],
+        "notes": [_note(f) for f in ends] if notes is None else list(notes),
     }
     for p in points:
         for array in (p.u, p.tangent.u):
@@ -245,25 +255,24 @@ def _restarted(branch: Branch, settings: Settings, end: int) -> Follower | None:
     )
 
 
-def resumed(branch: Branch, settings: Settings) -> Branch:
-    """The branch with more points at every end that can go on (see `Branch.extend`)."""
+def resumed(branch: Branch, settings: Settings) -> Walk:
+    """The walk that goes on from every end of the branch that can go on (see `Branch.extend`)."""
     entries = [_entry_from(branch, i, settings) for i in range(len(branch))]
-    followers: list[Follower | None] = [_restarted(branch, settings, end) for end in (0, 1)]
-    statuses = list(branch.statuses)
-    for end, follower in enumerate(followers):
-        if follower is None:
-            continue
-        follower.run()
-        statuses[end] = follower.status or Status.STEP_TOO_SMALL
-        new = follower.entries
-        if end:
-            entries = entries + new
-        else:
-            entries = [_reversed(e) for e in reversed(new)] + entries
-    return assemble(settings, entries, (statuses[0], statuses[1]), (followers[0], followers[1]))
+    behind, ahead = (_restarted(branch, settings, end) for end in (0, 1))
+
+    def together(walk: Walk) -> Branch:
+        before = [] if behind is None else [turned(e) for e in reversed(behind.entries)]
+        after = [] if ahead is None else ahead.entries
+        sides = zip((behind, ahead), branch.statuses, branch.messages)
+        told = [(status, note) if f is None else (ended(f), _note(f)) for f, status, note in sides]
+        (first, one), (last, other) = told
+        return assemble(settings, [*before, *entries, *after], (first, last), (behind, ahead), (one, other))
+
+    return Walk((behind, ahead), together)
 
 
-def _reversed(entry: Entry) -> Entry:
+def turned(entry: Entry) -> Entry:
+    """The same point, passed in the other direction."""
     p = entry.point
     t = Tangent(-p.tangent.u, -p.tangent.parameter, p.tangent.weight)
-    return Entry(p._replace(tangent=t, s=-p.s), entry.found)
+    return Entry(p._replace(tangent=t, s=-p.s, determinant_sign=-p.determinant_sign), entry.found)

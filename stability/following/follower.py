@@ -241,7 +241,8 @@ class Follower(Iterator[Point]):
         last, settings = self.last, self.settings
         point = make_point(last.problem, found, tangent, settings.index, last.s, h)
         if not np.isfinite(point.spectrum.values).all():
-            self.note = "multipliers or eigenvalues are not finite"
+            known = getattr(last.problem, "evaluations", None)
+            self.note = "multipliers or eigenvalues are not finite" + ("" if known is None else known.failure())
             return 0.4
         seen = compare(last, point, guess, self._rate)
         point = point._replace(s=last.s + seen.distance, step=seen.distance)

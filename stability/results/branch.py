@@ -147,6 +147,17 @@ class Branch:
         """Why the branch ended (its last end; ``statuses[0]`` tells about the first of a two-sided branch)."""
         return self.statuses[1]
 
+    @property
+    def messages(self) -> tuple[str, str]:
+        """Why the branch stopped at either end, in words; empty where the status says it all."""
+        first, last = self.method.get("notes", ("", ""))
+        return str(first), str(last)
+
+    @property
+    def message(self) -> str:
+        """Why the branch ended, in words: what the last refused step ran into, or what was raised."""
+        return self.messages[1]
+
     @cached_property
     def columns(self) -> Columns:
         """Named columns, (P,) each: the parameter, the problem's measures, arclength, residual."""

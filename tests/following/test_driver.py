@@ -8,7 +8,6 @@ import sympy as sp
 
 import stability as st
 from stability.errors import ConvergenceError, InputError, NonFiniteError, UnknownNameError
-from stability.following.driver import followers
 
 x, y, a, b = sp.symbols("x y a b", real=True)
 
@@ -171,12 +170,6 @@ def test_extend_into_a_wider_window() -> None:
     problem = one_state(a - x**3 - x, a=0.0)
     branch = st.continuation(problem, "a", (0.0, 1.0)).extend(window=(0.0, 3.0))
     assert branch.parameter[-1] == 3.0 and branch.window == (0.0, 3.0)
-
-
-def test_stepping_by_hand() -> None:
-    (follower,) = followers(one_state(a - x**3 - x, a=0.0), "a", (0.0, 2.0))
-    points = list(follower)
-    assert follower.status is st.Status.PARAMETER_BOUND and points[-1].parameter == 2.0
 
 
 def test_two_hopf_points_and_a_neutral_saddle() -> None:
