@@ -222,7 +222,10 @@ class Problem(Protocol):
         """Values without the trivial ones, counts, verdict."""
 
     def adapt(self, u: Array, params: Array, tangent: Any) -> tuple[Any, Array, Any] | None:
-        """A better mesh or scales for this solution, with u and tangent carried over (to be corrected); None: keep."""
+        """A better mesh or scales for this solution, with u and tangent carried over (to be corrected); None: keep.
+
+        The given u itself says that only the scales are new, which leaves solutions and spectra as they are.
+        """
 
     def measures(self, u: Array, params: Array) -> dict[str, float]:
         """Columns of a branch: ``<state>`` or ``<state>.max``, ``.min``, ``.amplitude`` ..., outputs, "period"."""

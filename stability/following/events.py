@@ -26,6 +26,7 @@ __all__ = ["Changes", "Dip", "changes", "crossed", "dip_of", "double_turn", "sup
 
 
 _LOST = 0.1  # an error of multipliers (eigenvalues: relative to the largest) beyond which counts mean nothing
+_FEW = 6
 _STILL = 1e-10  # a scaled rate of the parameter that is rounding
 
 
@@ -110,14 +111,13 @@ def supported(a: Point, b: Point) -> bool:
     """
     near = False
     for p in (a, b):
-        values = p.spectrum.values
-        if not values.size:
+        values, error = p.spectrum.values.tolist(), p.spectrum.error
+        if not values:
             return True
         circle = p.problem.critical.circle
-        if p.spectrum.error > _LOST * (1.0 if circle else float(np.abs(values).max())):
+        if error > (_LOST if circle else _LOST * max(map(abs, values))):
             return False
-        gap = np.abs(np.abs(values) - 1.0) if circle else np.abs(values.real)
-        near = near or float(gap.min()) > p.spectrum.error
+        near = near or min(abs(abs(z) - 1.0) if circle else abs(z.real) for z in values) > error
     return near
 
 
@@ -189,10 +189,9 @@ def dip_of(points: tuple[Point, Point, Point], which: int) -> Dip | None:
     if which >= 0:
         return vertex(at, (_test(p, which), _test(q, which), _test(r, which)))
     deepest = None
-    growth = matched_growth(points, which)
-    size = np.abs(growth)
-    for y0, y1, y2 in growth[:, (size[1] < size[0]) | (size[1] < size[2])].T.tolist():
-        dip = vertex(at, (y0, y1, y2))
+    for values in _matched(points, which):
+        size = abs(values[1])
+        dip = vertex(at, values) if size < abs(values[0]) or size < abs(values[2]) else None
         if dip is not None and (deepest is None or dip.depth < deepest.depth):
             deepest = dip
     return deepest
@@ -207,17 +206,37 @@ def matched_growth(points: tuple[Point, Point, Point], which: int) -> NDArray[np
 
     Values are matched to the nearest in the other two spectra, each used once.
     """
-    spectra = [p.spectrum.values for p in points]
-    middle = spectra[1]
-    wanted = middle.imag == 0 if which == -1 else middle.imag > 0
-    if not spectra[0].size == middle.size == spectra[2].size or not wanted.any():
-        return np.zeros((3, 0))
-    matched = np.array([spectra[0][_assigned(middle, spectra[0])], middle, spectra[2][_assigned(middle, spectra[2])]])
-    matched = matched[:, wanted]
+    return np.array(_matched(points, which)).reshape(-1, 3).T
+
+
+def _matched(points: tuple[Point, Point, Point], which: int) -> list[tuple[float, float, float]]:
+    """The columns of `matched_growth`."""
+    first, middle, last = (p.spectrum.values for p in points)
+    values = middle.tolist()
+    wanted = [k for k, z in enumerate(values) if (z.imag == 0.0 if which == -1 else z.imag > 0.0)]
+    if not wanted or not first.size == middle.size == last.size:
+        return []
+    before, after = (_partners(middle, values, others) for others in (first, last))
+    triples = [(before[k], values[k], after[k]) for k in wanted]
     if not points[0].problem.critical.circle:
-        return matched.real
-    with np.errstate(divide="ignore"):
-        return np.asarray(np.log(np.abs(matched)))
+        return [(x.real, y.real, z.real) for x, y, z in triples]
+    return [(_log(x), _log(y), _log(z)) for x, y, z in triples]
+
+
+def _log(z: complex) -> float:
+    """log|z|, -inf for zero."""
+    size = abs(z)
+    return math.log(size) if size else -math.inf
+
+
+def _partners(middle: NDArray[np.complex128], values: list[complex], others: NDArray[np.complex128]) -> list[complex]:
+    """For every value its partner (see `_assigned`); a few values are nearest to different ones almost always."""
+    listed = others.tolist()
+    if len(values) <= _FEW:
+        nearest = [min(range(len(listed)), key=lambda k, v=v: abs(v - listed[k])) for v in values]  # type: ignore[misc]
+        if len(set(nearest)) == len(values):
+            return [listed[k] for k in nearest]
+    return [listed[k] for k in _assigned(middle, others).tolist()]
 
 
 def _assigned(values: NDArray[np.complex128], others: NDArray[np.complex128]) -> NDArray[np.int64]:

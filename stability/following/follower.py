@@ -23,14 +23,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, StabilityWarning
-from ..protocols import Corrected, Tangent
+from ..protocols import Corrected, Problem, Tangent
 from ..words import Kind, Status
 from .edges import Edge
 from .events import changes
-from .locating import Found, Locator
+from .locating import Found, Locator, chord_length
 from .loops import Home, collapsed
 from .monitoring import Monitor
-from .points import Point, dot, make_point
+from .points import Point, dot, make_point, rescaled
 from .searching import between, hopped
 from .settings import Progress, Settings
 from .stepping import KINK, Comparison, compare, next_length, predict
@@ -82,6 +82,7 @@ class Follower(Iterator[Point]):
         since_adapt: int = 0, home: Home | None = None, mirrored: bool = False, rate: float = 0.0,
     ) -> None:
         self.settings, self.last, self.before = settings, first, before
+        self._older: list[Point] = []  # points before that one, latest first
         self._twin: Point | None = None  # `last` before its mesh was adapted
         self.length = settings.steps.first if length is None else length
         self.since_adapt = since_adapt
@@ -187,7 +188,7 @@ class Follower(Iterator[Point]):
     def _try(self, h: float) -> tuple[Point, Comparison] | float:
         """An accepted point, or the factor by which to shorten the step."""
         settings, last = self.settings, self.last
-        u, parameter = predict(last, self.before, h)
+        u, parameter = predict(last, self._past, h)
         wall = self._wall(parameter)
         if wall is not None:
             return self._land(wall, h)
@@ -220,7 +221,7 @@ class Follower(Iterator[Point]):
         reach = (wall - last.parameter) / rate if rate else math.inf
         if not 0 < reach <= 2 * h:
             return 0.5
-        u, _ = predict(last, self.before, reach)
+        u, _ = predict(last, self._past, reach)
         params = last.params.copy()
         params[settings.index] = wall
         found = last.problem.correct(u, params, settings.name, None, 0.0, settings.tolerance)
@@ -283,6 +284,7 @@ class Follower(Iterator[Point]):
             self.status, self.note = Status.PARAMETER_BOUND, ""
         elif (grown := self._runaway(point)):
             self.status, self.note = Status.DIVERGED, grown
+        self._older = self._past[:2]
         self.before, self.last, self._twin = last, point, None
         if failure is not None:
             self._broken(failure)
@@ -353,6 +355,9 @@ class Follower(Iterator[Point]):
             self.since_adapt = 0
             return
         problem, u, tangent = better
+        if u is old.u:
+            self._rescale(problem)
+            return
         found = problem.correct(u, old.params, settings.name, tangent, 0.0, settings.tolerance)
         if not found.converged or found.tangent is None:
             return
@@ -362,9 +367,29 @@ class Follower(Iterator[Point]):
         new = make_point(problem, found, found.tangent, settings.index, old.s, old.step)
         if not changes(old, new).nothing:
             return  # an event lies within the discretisation error: leave the mesh until it is passed
+        self._exchange(new)
+        self._twin = old
+
+    def _rescale(self, problem: Problem) -> None:
+        """Other scales on the same mesh: nothing to solve, and the point before goes along."""
+        old, new = self.last, rescaled(self.last, problem)
+        past = [new, *(rescaled(p, problem) for p in self._past if p.problem is old.problem)]
+        past = [p._replace(step=chord_length(q, p)) for p, q in pairwise(past)] + past[-1:]
+        self._exchange(past[0])
+        if len(past) > 1:
+            self.before, self._older = past[1], past[2:]
+
+    @property
+    def _past(self) -> list[Point]:
+        """The points before the last one, latest first."""
+        return [] if self.before is None else [self.before, *self._older]
+
+    def _exchange(self, new: Point) -> None:
+        """Put `new` in the place of the last point."""
+        old = self.last
         self._growth *= self._norm_of(old) / max(self._norm_of(new), 1e-300)
         self.since_adapt = 0
-        self.last, self._twin = new, old
+        self.last = new
         where = next(i for i in range(len(self.entries) - 1, -1, -1) if self.entries[i].point is old)
         self.entries[where] = Entry(new, self.entries[where].found)
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..protocols import Corrected, Problem, Spectrum, Tangent
 
-__all__ = ["Point", "dot", "make_point", "smooth_tests", "tangent_of"]
+__all__ = ["Point", "dot", "make_point", "rescaled", "smooth_tests", "tangent_of"]
 
 Array = NDArray[np.float64]
 _SMALL = 6
@@ -95,6 +95,13 @@ def make_point(problem: Problem, found: Corrected, tangent: Tangent, k: int, s: 
         problem, found.u, found.params, parameter, tangent, spectrum, tests, found.determinant_sign, found.residual,
         found.iterations, s, step,
     )
+
+
+def rescaled(point: Point, problem: Problem) -> Point:
+    """The same point of the same equations, for a problem with other scales: its tangent has another length."""
+    t = point.tangent
+    size = math.sqrt(dot(problem.weights, t.u, t.u) + (t.parameter * t.weight) ** 2)
+    return point._replace(problem=problem, tangent=Tangent(t.u / size, t.parameter / size, t.weight))
 
 
 def tangent_of(

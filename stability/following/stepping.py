@@ -1,12 +1,13 @@
 r"""How long a step may be: prediction, the checks a new point must pass, and the next length.
 
-From the last point z_0 with unit tangent t_0, and z_-1 with t_-1 before it at distance d, the predictor is their cubic,
+From the last point z_0 with unit tangent t_0 and the points before it, at arclengths s_1 > s_2 > .. back from it, the
+predictor is the explicit Adams formula
 
-    z = z_0 + h t_0 + h^2 (t_0 - D)/d + h^2 (h + d) (t_0 - 2 D + t_-1)/d^2,      D = (z_0 - z_-1)/d,
+    z = z_0 + int_0^h sum_i t_i l_i(s) ds,      l_i the Lagrange polynomials of 0, s_1, s_2, .. (four points at most),
 
-or, where h is much longer than d or the multipliers are lost in rounding errors (the recursion of cubics is unstable
-unless Newton's method mends every direction), the parabola of the tangents, z_0 + h t_0 + h^2/2 (t_0 - t_-1)/d. It is
-corrected orthogonally to t_0. The new point z_1 with tangent t_1 is accepted if
+corrected orthogonally to t_0. (Points and tangents together would give the same order from half as many points, but
+an unstable recursion where Newton's method leaves a direction as predicted: the phase of an autonomous orbit.)
+The new point z_1 with tangent t_1 is accepted if
 
     angle(t_0, t_1) <= ANGLE               the curve does not turn too far,
     angle(z_1 - z_0, t_0 + t_1) <= CHORD   chord and mean tangent agree: on a smooth curve they do to second order in h,
@@ -22,6 +23,7 @@ the longest step the angle is no longer an obstacle.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,13 +31,14 @@ from numpy.typing import NDArray
 
 from .points import Point
 
-__all__ = ["Comparison", "Steps", "compare", "predict", "spectral_motion"]
+__all__ = ["Comparison", "Steps", "adams_weights", "compare", "predict", "spectral_motion"]
 
 Array = NDArray[np.float64]
 ANGLE, CHORD, MISSED, MOTION, KINK = 0.6, 0.15, 0.2, 0.7, 1e-4
 _FEW = 3
 _APPROACH, _CREEP = 0.8, 0.1
-_FAR, _LOST = 2.5, 0.1
+_FAR, _ORDER = 2.5, 4
+_GAUSS = 0.5 - 0.5 / math.sqrt(3)
 _SMALL = 6
 
 
@@ -75,22 +78,44 @@ class Comparison:
         return max(sentences, key=sentences.__getitem__)
 
 
-def predict(last: Point, before: Point | None, h: float) -> tuple[Array, float]:
-    """(u, parameter) of the predictor; `before` None, or on another mesh, gives the tangent predictor."""
-    t, d = last.tangent, last.step
-    if before is None or before.problem is not last.problem or not d > 0:
-        return last.u + h * t.u, last.parameter + h * t.parameter
-    old = before.tangent
-    square, cube = h * h / d, h * h * (h + d) / (d * d)
-    if h > _FAR * d or not last.spectrum.error < _LOST:
-        cube = -0.5 * square
-    a, b = h + square + cube, (square + 2 * cube) / d
-    u = a * t.u + cube * old.u + last.u
-    parameter = a * t.parameter + cube * old.parameter + last.parameter
-    if b != 0.0:
-        u -= b * (last.u - before.u)
-        parameter -= b * (last.parameter - before.parameter)
+def predict(last: Point, past: Sequence[Point], h: float) -> tuple[Array, float]:
+    """(u, parameter) of the predictor; `past`, the points before, latest first, counts as far as it shares the mesh.
+
+    Steps that differ too much end the past: extrapolation far beyond short steps, or from a long one, is of no use.
+    """
+    tangents, places = [last.tangent], [0.0]
+    newer, reach = last, h
+    for point in past[: _ORDER - 1]:
+        if point.problem is not last.problem or not newer.step > 0 or (reach > _FAR * newer.step and len(places) > 1):
+            break
+        places.append(places[-1] - newer.step)
+        tangents.append(point.tangent)
+        newer, reach = point, newer.step
+        if h > _FAR * last.step:
+            break
+    u, parameter = last.u.copy(), last.parameter
+    for weight, t in zip(adams_weights(places, h), tangents):
+        u += weight * t.u
+        parameter += weight * t.parameter
     return u, parameter
+
+
+def adams_weights(places: Sequence[float], h: float) -> list[float]:
+    """int_0^h l_i(s) ds of the Lagrange polynomials of at most four `places`, by Gauss quadrature with two points.
+
+    >>> adams_weights([0.0, -1.0], 1.0)
+    [1.5, -0.5]
+    """
+    half, first, second = 0.5 * h, _GAUSS * h, (1 - _GAUSS) * h
+    weights = []
+    for x in places:
+        p = q = half
+        for y in places:
+            if y != x:
+                p *= (first - y) / (x - y)
+                q *= (second - y) / (x - y)
+        weights.append(p + q)
+    return weights
 
 
 def spectral_motion(a: NDArray[np.complex128], b: NDArray[np.complex128], circle: bool, rate: float = 0.0) -> float:

@@ -31,7 +31,7 @@ from ..kernels.condensation_reduced import monodromy_product
 from ..kernels.meshes import uniform_edges
 from ..protocols import Corrected, Spectrum, Tangent
 from ..systems.stops import refuse_stops
-from .collocation_error import multiplier_error, node_error
+from .collocation_error import carried_to, multiplier_error, node_error
 from .collocation_linearisation import CollocationLinearisation, Workspace
 from .orbit_adaption import adapted
 from .orbit_mesh import OrbitMesh
@@ -236,6 +236,16 @@ class Collocation(OrbitDiscretisation):
         periods = f", {self.multiple} forcing periods" if self.multiple > 1 else ""
         return f"Collocation of '{self.system.name}', {self._size_in_words}{periods}"
 
+    def rescaled(self, scales: Array, period_scale: float) -> Collocation:
+        """The same problem on the same mesh with other scales."""
+        own = {k: v for k, v in vars(self).items() if k not in ("weights", "quadrature", "raised_weights")}
+        scales = np.array(scales, float)
+        scales.setflags(write=False)
+        new: Collocation = object.__new__(type(self))
+        vars(new).update(own, scales=scales, period_scale=float(period_scale), _memo={})
+        carried_to(self, new)
+        return new
+
     @property
     def _size_in_words(self) -> str:
         return f"{self.mesh.intervals} intervals of degree {self.degree}"
@@ -393,7 +403,7 @@ class Collocation(OrbitDiscretisation):
         error += 1e-15 * float(np.abs(M).max()) * len(M)
         factors = linearisation.work.M
         if self.halved:
-            factors = np.concatenate([factors, np.linalg.inv(self.closure)[None]])
+            factors = np.concatenate([factors, self.closure[None]])  # S^-1 = S
         values = contracted(values, factors)
         error += liouville_gap(values, self._growth_of_volume(linearisation), self.orientation)
         return orbit_spectrum(values, error, self._area_preserving(linearisation))
@@ -401,8 +411,8 @@ class Collocation(OrbitDiscretisation):
     def _growth_of_volume(self, linearisation: CollocationLinearisation) -> float:
         """int tr J dt over the span of the mesh, by the mesh's own Gauss quadrature."""
         J, n = linearisation.work.J, self.mesh.n
-        trace = J.reshape(len(J), n * n)[:, :: n + 1].sum(axis=1)
-        return linearisation.sigma * float(self.mesh.weights @ trace)
+        mean = self.mesh.weights @ J.reshape(len(J), n * n)
+        return linearisation.sigma * float(mean[:: n + 1].sum())
 
     @cached_property
     def orientation(self) -> float:
@@ -412,9 +422,9 @@ class Collocation(OrbitDiscretisation):
     def _area_preserving(self, linearisation: CollocationLinearisation) -> bool:
         """Whether a forced system of two states has no divergence, hence det M = 1."""
         J = linearisation.work.J
-        if np.linalg.det(self.closure) < 0:
+        if self.mesh.n != 2 or self.mesh.own or self.orientation < 0 or J[0, 0, 0] + J[0, 1, 1] != 0.0:
             return False
-        if self.mesh.n != 2 or self.mesh.own or float(np.abs(J[:, 0, 0] + J[:, 1, 1]).max()) != 0.0:
+        if float(np.abs(J[:, 0, 0] + J[:, 1, 1]).max()) != 0.0:
             return False
         return self.flow.divergence_free(linearisation.params)
 
@@ -422,7 +432,7 @@ class Collocation(OrbitDiscretisation):
         """M of the node relations M_j (N, n, n)."""
         product = monodromy_product(factors)
         if self.halved:
-            product = np.linalg.solve(self.closure, product)
+            product = self.closure @ product  # S^-1 = S
         return np.asarray(product * self.scales / self.scales[:, None])
 
     def _direction_of_flow(self, linearisation: CollocationLinearisation) -> Array:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .collocation import Collocation
     from .collocation_linearisation import CollocationLinearisation, Workspace
 
-__all__ = ["multiplier_error", "node_error", "refined"]
+__all__ = ["carried_errors", "carried_to", "multiplier_error", "node_error", "refined"]
 
 Array = np.ndarray
 _SINGULAR = 1e-4  # distance of a multiplier from 1 below which a step at a fixed parameter means nothing
@@ -119,14 +119,9 @@ def multiplier_error(
     Where no multiplier is near the circle, the change at an earlier point of the same mesh is carried over, times
     3 and the square of the growth of the m-th derivative (up to 2): nodes have twice the order of the polynomial.
     """
-    mesh = problem.mesh
-    nodes, stages, _ = mesh.split(linearisation.solution)
-    size = float(np.abs(mesh.leading(nodes, stages) / problem.scales).max())
-    known = problem._memo.get("level")
-    if known is not None and 0 < size < 2 * known[1]:
-        carried = 3 * known[0] * max(1.0, size / known[1]) ** 2
-        if float(np.abs(np.abs(values) - 1).min(initial=1.0)) > 1e3 * carried + 1e-5:
-            return float(carried)
+    carried, _ = carried_errors(problem, linearisation.solution)
+    if min((abs(abs(z) - 1) for z in values.tolist()), default=1.0) > 1e3 * carried + 1e-5:
+        return carried
     step = refined(problem, linearisation.solution, linearisation.solution_params)
     if step is None:
         return math.inf
@@ -134,5 +129,32 @@ def multiplier_error(
     if direction is not None:
         other = deflated(other, direction)[0]
     error = spectrum_distance(values, eigenvalues(other))
-    problem._memo["level"] = (max(error, 1e-15), size)
+    nodes = node_error(problem, linearisation.solution, linearisation.solution_params)
+    problem._memo["level"] = (max(error, 1e-15), nodes, _roughness(problem, linearisation.solution))
     return error
+
+
+def carried_errors(problem: Collocation, u: Array) -> tuple[float, float]:
+    """Errors of multipliers and nodes carried from an earlier point of the same mesh (see above); inf: unknown."""
+    known = problem._memo.get("level")
+    if known is None:
+        return math.inf, math.inf
+    growth = _roughness(problem, u) / known[2] if known[2] > 0 else math.inf
+    if not 0 < growth < 2:
+        return math.inf, math.inf
+    factor = 3 * max(1.0, growth) ** 2
+    return factor * known[0], factor * known[1]
+
+
+def carried_to(problem: Collocation, new: Collocation) -> None:
+    """Let `new`, the same problem with other scales, know the errors that `problem` knows."""
+    known = problem._memo.get("level")
+    if known is not None:
+        ratios = problem.scales / new.scales
+        new._memo["level"] = (known[0], known[1] * float(ratios.max()), known[2] * float(ratios.min()))
+
+
+def _roughness(problem: Collocation, u: Array) -> float:
+    """Largest m-th derivative of the scaled states."""
+    nodes, stages, _ = problem.mesh.split(u)
+    return float(np.abs(problem.mesh.leading(nodes, stages) / problem.scales).max())

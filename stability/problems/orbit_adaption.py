@@ -20,6 +20,7 @@ import numpy as np
 
 from ..kernels.meshes import equidistribute, monitor
 from ..protocols import Tangent
+from .collocation_error import carried_errors
 
 if TYPE_CHECKING:
     from ..systems.system import System
@@ -29,6 +30,7 @@ __all__ = ["adapted", "natural_sizes", "state_scales"]
 
 Array = np.ndarray
 _UNEVEN = 1.5  # largest share of the monitor over the mean share that is left alone
+_FINE = 1e-2  # part of the wanted accuracy below which nobody minds where the intervals are
 _TINY = 1e-6
 _LOST = 30.0  # errors below so many times their rounding do not ask for more intervals
 _ANGLE = 0.02  # rad
@@ -71,20 +73,24 @@ def adapted(
         scales, period_scale = problem.scales, problem.period_scale
     if not problem.adaptive and not rescale:
         return None
-    error = problem.error(u, params)
     breaks = problem.break_points(params)
-    rho = monitor(mesh.edges, mesh.leading(nodes, stages) / scales, mesh.degree, breaks)
-    share = rho * mesh.h
-    count = _wanted_intervals(problem, error) if problem.adaptive else mesh.intervals
-    if count > mesh.intervals and error < _LOST * _rounding(problem, u, params):
-        count = mesh.intervals
     moved = any(np.abs(mesh.edges - b).min() > 1e-12 for b in breaks)
-    uneven = problem.adaptive and error > 1e-2 * problem.accuracy and share.max() > _UNEVEN * share.mean()
-    if not (rescale or moved or uneven or count != mesh.intervals):
-        return None
-    edges = mesh.edges
-    if moved or uneven or count != mesh.intervals:
-        edges = equidistribute(mesh.edges, rho, count, breaks)
+    count, edges = mesh.intervals, mesh.edges
+    if problem.adaptive or moved:
+        _, error = carried_errors(problem, u)
+        if not error <= _FINE * problem.accuracy:
+            error = problem.error(u, params)
+        count = _wanted_intervals(problem, error) if problem.adaptive else count
+        if count > mesh.intervals and error < _LOST * _rounding(problem, u, params):
+            count = mesh.intervals
+        if moved or count != mesh.intervals or error > _FINE * problem.accuracy:
+            rho = monitor(mesh.edges, mesh.leading(nodes, stages) / scales, mesh.degree, breaks)
+            share = rho * mesh.h
+            uneven = problem.adaptive and share.max() > _UNEVEN * share.mean()
+            if moved or uneven or count != mesh.intervals:
+                edges = equidistribute(mesh.edges, rho, count, breaks)
+    if edges is mesh.edges:
+        return (problem.rescaled(scales, period_scale), u, tangent) if rescale else None
     new = dataclasses.replace(problem, edges=edges, scales=scales, period_scale=period_scale, _memo={})
     if tangent is None:
         return new, mesh.transfer(new.mesh, u)[0], None

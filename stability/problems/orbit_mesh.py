@@ -11,7 +11,7 @@ Equations in the same places: node equations and the boundary condition x(1) = S
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -20,6 +20,12 @@ from stability.kernels.gauss import GaussRule, gauss_rule, lagrange_matrix
 __all__ = ["OrbitMesh"]
 
 Array = np.ndarray
+
+
+@lru_cache(maxsize=64)
+def _between_degrees(degree: int, other: int) -> Array:
+    """(m', m + 1): values at (0, c_1, .., c_m) -> values at the Gauss points of another degree."""
+    return lagrange_matrix(gauss_rule(degree).abscissae, gauss_rule(other).points)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +99,14 @@ class OrbitMesh:
 
     def leading(self, nodes: Array, stages: Array) -> Array:
         """(N, n): the m-th derivative over m! of the polynomial with respect to s."""
-        values = self.rule.leading @ self.polynomial(nodes, stages)
-        return np.asarray(values / (self.h**self.degree)[:, None])
+        matrix, first, powers = self._derivative
+        return np.asarray((stages @ matrix + first * nodes[:-1]) * powers)
+
+    @cached_property
+    def _derivative(self) -> tuple[Array, float, Array]:
+        """The m-th derivative: (m n, n) on the stages of an interval, a factor of its left node, h^-m (N, 1)."""
+        first, *rest = self.rule.leading
+        return np.kron(np.array(rest)[:, None], np.eye(self.n)), float(first), self.h[:, None] ** -self.degree
 
     def transfer(self, other: OrbitMesh, *vectors: Array) -> list[Array]:
         """Vectors u of this mesh as vectors of `other` (same n, span and own)."""
@@ -122,7 +134,7 @@ class OrbitMesh:
 
     def resample(self, other: OrbitMesh, nodes: Array, stages: Array) -> Array:
         """Stage values (N, m' n) of the same polynomial for another degree on the same edges."""
-        matrix = lagrange_matrix(self.rule.abscissae, other.rule.points)
+        matrix = _between_degrees(self.degree, other.degree)
         return (matrix @ self.polynomial(nodes, stages)).reshape(self.intervals, -1)
 
     def quadrature(self, scales: Array) -> Array:
