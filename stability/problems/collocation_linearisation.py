@@ -114,9 +114,9 @@ class CollocationLinearisation:
         inner = stages.reshape(mesh.intervals, mesh.degree, mesh.n)
         W, d = rule.inverse, rule.update
         field_part = (mesh.h * self.sigma)[:, None, None] * self.work.F.reshape(inner.shape)
-        stage = np.einsum("ik,jkn->jin", W, inner - nodes[:-1, None, :]) - field_part
+        stage = W @ (inner - nodes[:-1, None, :]) - field_part
         node = np.empty_like(nodes)
-        node[:-1] = nodes[1:] - (1 - d.sum()) * nodes[:-1] - np.einsum("i,jin->jn", d, inner)
+        node[:-1] = nodes[1:] - (1 - d.sum()) * nodes[:-1] - d @ inner
         node[-1] = nodes[-1] - self.problem.closure @ nodes[0] - self.problem.winding
         return mesh.join(node, stage, 0.0)
 
@@ -262,6 +262,8 @@ class CollocationLinearisation:
 
     def _bilinear(self, w: Array, v: Array, free: int) -> tuple[Array, Array]:
         """Complex w and v by the real ones."""
+        if not (np.iscomplexobj(w) or np.iscomplexobj(v)):
+            return self._gradient(w, v, free)
         kind = np.result_type(w, v, float)
         total = np.zeros(self.mesh.size, kind), np.zeros(len(self.params), kind)
         for a, real_w in ((1.0, np.real(w)), (1j, np.imag(w))):
@@ -292,11 +294,15 @@ class CollocationLinearisation:
         # sizes of the variables, so that second derivatives by differences are well scaled
         sizes = np.concatenate([D, np.maximum(np.abs(self.params), 1e-3)])
         second = problem.evaluations.second_gradient(mesh.phase, states, self.params, direction, weighted, sizes)
-        along = np.einsum("cij,cj->ci", J, V) + amount * work.Fp[:, :, free]
+        along = (J @ V[:, :, None])[:, :, 0]
+        g_state, g_params = sigma * second[:, :n], sigma * second[:, n:].sum(axis=0)
+        if amount != 0.0:
+            along += amount * work.Fp[:, :, free]
         stretch = mesh.span * (tau + work.dT[free] * amount)
-        g_state = sigma * second[:, :n] + stretch * np.einsum("cij,ci->cj", J, weighted)
-        g_params = sigma * second[:, n:].sum(axis=0) + stretch * np.einsum("cim,ci->m", work.Fp, weighted)
-        change = (along * weighted).sum()
+        if stretch != 0.0:
+            g_state += stretch * np.einsum("cij,ci->cj", J, weighted)
+            g_params += stretch * np.einsum("cim,ci->m", work.Fp, weighted)
+        change = float(np.vdot(along, weighted))
         g_params += mesh.span * work.dT * change
         if not own and amount != 0.0:
             g_params += mesh.span * amount * problem.flow.period_second(self.params, free) * (work.F * weighted).sum()

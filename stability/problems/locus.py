@@ -16,6 +16,7 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,7 @@ class Locus:
         """Number of extra unknowns."""
         return 1 if self.kind in _PAIRS or self.kind is Kind.BRANCH_POINT else 0
 
-    @property
+    @cached_property
     def _place(self) -> int:
         return list(self.inner.parameters).index(self.free)
 
@@ -83,7 +84,7 @@ class Locus:
         params[self._place] = self.parts(U)[1]
         return params
 
-    @property
+    @cached_property
     def weights(self) -> Array:
         """(N + 1 + e,) those of the inner problem, 1 / scale^2, zeros."""
         return np.concatenate([self.inner.weights, [self.scale**-2], np.zeros(self.extras)])
@@ -206,12 +207,15 @@ class Locus:
 
     def ordered(self, U: Array, first: float) -> Array:
         """(u, lambda_1, lambda_2, e) from U = (u, lambda_2, e) and lambda_1."""
-        return np.insert(U, U.size - 1 - self.extras, first)
+        n, out = U.size - 1 - self.extras, np.empty(U.size + 1)
+        out[:n], out[n], out[n + 1 :] = U[:n], first, U[n:]
+        return out
 
     def split(self, x: Array) -> tuple[Array, float]:
         """The inverse of `ordered`."""
-        place = x.size - 2 - self.extras
-        return np.delete(x, place), float(x[place])
+        n, out = x.size - 2 - self.extras, np.empty(x.size - 1)
+        out[:n], out[n:] = x[:n], x[n + 1 :]
+        return out, float(x[n])
 
     # ------------------------------------------------------------------ spectrum, adaption, what a user sees
     def spectrum(self, linearisation: Place) -> Spectrum:

@@ -101,9 +101,11 @@ def normal_form(kind: Kind, forms: Forms, circle: bool) -> NormalForm:
     if kind in (Kind.FOLD, Kind.BRANCH_POINT):
         return _at_plus_one(kind, forms, circle)
     if kind is Kind.PERIOD_DOUBLING and circle:
-        p, q = _critical_vectors(forms.matrix, -1.0)
-        h = np.linalg.solve(np.eye(len(q)) - forms.matrix, forms.second(q, q))
-        terms = [p @ forms.third(q, q, q) / 6, p @ forms.second(q, h) / 2]
+        p, q = _null_vectors(forms.matrix + np.eye(len(forms.matrix)))
+        terms = forms.cubic_terms(p, q) if hasattr(forms, "cubic_terms") else None
+        if terms is None:
+            h = np.linalg.solve(np.eye(len(q)) - forms.matrix, forms.second(q, q))
+            terms = (p @ forms.third(q, q, q) / 6, p @ forms.second(q, h) / 2)
         return _judged(np.real(terms), forms, np.real(q), -1)
     if kind is Kind.HOPF and not circle:
         return _hopf(forms)
@@ -122,6 +124,13 @@ def _critical_vectors(matrix: Array, target: complex) -> tuple[Complex, Complex]
     if not np.imag(target):
         q, p = np.real(q), np.real(p)
     q = q / np.linalg.norm(q)
+    return p / (p @ q), q
+
+
+def _null_vectors(matrix: Array) -> tuple[Array, Array]:
+    """(p, q), p^T q = 1, |q| = 1, of a singular matrix."""
+    left, _, right = np.linalg.svd(matrix)
+    p, q = left[:, -1], right[-1]
     return p / (p @ q), q
 
 

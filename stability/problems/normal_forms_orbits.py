@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.condensation import solve_stages
-from ..kernels.condensation_sweeps import forward_sweep
+from ..kernels.condensation_sweeps import adjoint_sweep, forward_sweep
 
 __all__ = ["MapForms"]
 
@@ -59,8 +59,11 @@ class MapForms:
         """f_xx or f_xxx of variations (count, n) at the stages."""
         evaluations, L = self.L.problem.evaluations, self.L
         function = evaluations.second if len(vectors) == 2 else evaluations.third
-        zeros = np.zeros((len(self.states), len(L.params)))
-        directions = [np.concatenate([v, zeros], axis=1) for v in vectors]
+        directions = []
+        for v in vectors:
+            direction = np.zeros((len(v), self.n + len(L.params)))
+            direction[:, : self.n] = v
+            directions.append(direction)
         return np.asarray(function(L.mesh.phase, self.states, L.params, *directions))
 
     def _sweep(self, start: Array, forcing: Array | None) -> tuple[Array, Array]:
@@ -121,6 +124,27 @@ class MapForms:
 
     def _line(self, v: Array, third: bool) -> tuple[Array, Array]:
         return self._on_section(v, third) if self.own else self._jet(v, third)[1:]
+
+    def cubic_terms(self, p: Array, q: Array) -> tuple[float, float] | None:
+        """p.C(q, q, q)/6 and p.B(q, h)/2 with (I - A) h = B(q, q), by fewest sweeps; None on a section.
+
+        p . (end of a variation with inhomogeneity g) is a sum of g over the stages, by one adjoint sweep from p.
+        """
+        if self.own:
+            return None
+        L, mesh, zero = self.L, self.L.mesh, np.zeros(self.n)
+        _, V = self._sweep(self.scales * q, None)
+        end, W = self._sweep(zero, self._derivative(V, V))
+        h = np.linalg.solve(np.eye(self.n) - self.matrix, self._returned(end))
+        _, H = self._sweep(self.scales * h, None)
+        eta = np.linalg.solve(L.problem.closure.T, p / self.scales)
+        omega = adjoint_sweep(
+            self.factors[0], mesh.rule.row_sums, mesh.rule.update, *self.factors[1:],
+            np.zeros((mesh.intervals, mesh.degree * self.n)), eta,
+        )  # fmt: skip
+        weighted = L.sigma * (omega * mesh.h[:, None]).reshape(-1, self.n)
+        cubic = self._derivative(V, V, V) + 3 * self._derivative(V, W)
+        return float((weighted * cubic).sum()) / 6, float((weighted * self._derivative(V, H)).sum()) / 2
 
     # ------------------------------------------------------------------ multilinear forms
     def second(self, x: Any, y: Any) -> Any:
