@@ -14,9 +14,9 @@ from ..results.branch import Branch
 from ..results.special import SpecialPoint
 from ..words import Kind, Status, Verdict
 from .follower import Entry, Follower
-from .locating import Found
+from .locating import Found, chord_length
 from .loops import Home
-from .points import Point, dot, smooth_tests
+from .points import Point, dot, rescaled, smooth_tests
 from .settings import Settings
 from .walking import Walk, ended
 
@@ -24,6 +24,7 @@ __all__ = ["assemble", "resumed", "turned"]
 
 Array = NDArray[np.float64]
 _MERGE = 1e-10
+_PAST = 4  # points that the predictor looks at
 _CRITICAL = (Kind.FOLD, Kind.BRANCH_POINT, Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER, Kind.HOPF)
 
 
@@ -235,24 +236,33 @@ def _restarted(branch: Branch, settings: Settings, end: int) -> Follower | None:
     if branch.marks[i] >= 0 and branch.special[branch.marks[i]].kind is Kind.GRAZING:
         return None  # beyond it these solutions mean nothing
     sign, inward = (1, -1) if end else (-1, 1)
-    # neighbours as the driver met them: accepted points only
+    chain = [_point_from(branch, i, settings, 0.0, sign)]
     k = i + inward
-    while 0 <= k < len(branch) and branch.marks[k] >= 0 and branch.special[branch.marks[k]].kind is not Kind.USER:
+    while 0 <= k < len(branch) and len(chain) < _PAST:
+        # neighbours as the driver met them: accepted points only, on one mesh
+        if branch.marks[k] < 0 or branch.special[branch.marks[k]].kind is Kind.USER:
+            point, problem = _point_from(branch, k, settings, 0.0, sign), chain[0].problem
+            if not _differ_in_scales(point.problem, problem):
+                break
+            chain.append(point if point.problem is problem else rescaled(point, problem))
         k += inward
-    before = None
-    step = 0.0
-    last = _point_from(branch, i, settings, 0.0, sign)
-    if 0 <= k < len(branch) and branch.mesh_of[k] == branch.mesh_of[i]:
-        before = _point_from(branch, k, settings, 0.0, sign)
-        du, dl = last.u - before.u, (last.parameter - before.parameter) * settings.weight
-        step = math.sqrt(dot(last.problem.weights, du, du) + dl * dl)
-        last = last._replace(step=step)
+    chain = [p._replace(step=chord_length(q, p)) for p, q in pairwise(chain)] + chain[-1:]
     other = _point_from(branch, 0 if end else len(branch) - 1, settings, 0.0, sign)
     return Follower(
-        settings, last, before=before, length=float(resume["length"]), since_adapt=int(resume["since_adapt"]),
+        settings, chain[0], past=chain[1:], length=float(resume["length"]), since_adapt=int(resume["since_adapt"]),
         home=Home(other), mirrored=bool(resume.get("mirrored", False)),
         rate=float(np.nanmax(np.abs(branch.values), initial=0.0)),
     )
+
+
+def _differ_in_scales(one: Any, other: Any) -> bool:
+    """Whether two problems are the same, or would be with the same scales."""
+    if one is other:
+        return True
+    scales = ("scales", "period_scale")
+    return {k: v for k, v in one.spec.items() if k not in scales} == {
+        k: v for k, v in other.spec.items() if k not in scales
+    }
 
 
 def resumed(branch: Branch, settings: Settings) -> Walk:

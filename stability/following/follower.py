@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -78,11 +78,12 @@ class Follower(Iterator[Point]):
     """Follows one side of a branch from a first point whose tangent shows the way."""
 
     def __init__(
-        self, settings: Settings, first: Point, *, before: Point | None = None, length: float | None = None,
+        self, settings: Settings, first: Point, *, past: Sequence[Point] = (), length: float | None = None,
         since_adapt: int = 0, home: Home | None = None, mirrored: bool = False, rate: float = 0.0,
     ) -> None:
-        self.settings, self.last, self.before = settings, first, before
-        self._older: list[Point] = []  # points before that one, latest first
+        self.settings, self.last = settings, first
+        self.before = past[0] if past else None
+        self._older: list[Point] = list(past[1:])  # points before that one, latest first
         self._twin: Point | None = None  # `last` before its mesh was adapted
         self.length = settings.steps.first if length is None else length
         self.since_adapt = since_adapt
@@ -189,9 +190,11 @@ class Follower(Iterator[Point]):
         """An accepted point, or the factor by which to shorten the step."""
         settings, last = self.settings, self.last
         u, parameter = predict(last, self._past, h)
-        wall = self._wall(parameter)
+        wall, aside = self._wall(parameter), passed(last.problem, u)
         if wall is not None:
             return self._land(wall, h)
+        if aside is not None:
+            return self._land_aside(aside, h)
         params = last.params.copy()
         params[settings.index] = parameter
         try:
@@ -202,9 +205,11 @@ class Follower(Iterator[Point]):
         if not found.converged or found.tangent is None:
             self.note = found.note
             return 0.4
-        wall = self._wall(float(found.params[settings.index]))
+        wall, aside = self._wall(float(found.params[settings.index])), passed(last.problem, found.u)
         if wall is not None:
             return self._land(wall, h)
+        if aside is not None:
+            return self._land_aside(aside, h)
         return self._judged(found, found.tangent, h, (u, parameter))
 
     def _wall(self, parameter: float) -> float | None:
@@ -235,6 +240,18 @@ class Follower(Iterator[Point]):
         tangent = Tangent(slope.u / size, 1.0 / size, weight)
         signed = found._replace(determinant_sign=found.determinant_sign * (1 if size > 0 else -1))
         return self._judged(signed, tangent, reach, (u, wall))
+
+    def _land_aside(self, wall: Wall, h: float) -> tuple[Point, Comparison] | float:
+        """Solve on a wall of one of the unknowns, if it is about one step away."""
+        reach = reach_of(self.last, wall)
+        if not 0 < reach <= 2 * h:
+            return 0.5
+        guess = predict(self.last, self._past, reach)
+        solved = solved_on(self.last, wall, guess, self.settings.name, self.settings.index, self.settings.tolerance)
+        if solved is None or self._wall(float(solved[0].params[self.settings.index])) is not None:
+            self.note = "at the end of the other parameter's window"
+            return 0.5
+        return self._judged(*solved, reach, guess)
 
     def _judged(
         self, found: Corrected, tangent: Tangent, h: float, guess: tuple[Array, float]
@@ -280,7 +297,7 @@ class Follower(Iterator[Point]):
         elif back is not None:
             self._close(back[1])
             return
-        elif point.parameter in settings.window:
+        elif point.parameter in settings.window or on_wall(point):
             self.status, self.note = Status.PARAMETER_BOUND, ""
         elif (grown := self._runaway(point)):
             self.status, self.note = Status.DIVERGED, grown
@@ -311,9 +328,11 @@ class Follower(Iterator[Point]):
         for one in found:
             previous = self.entries[-1].point if self.entries else self.last
             point = one.point._replace(step=max(one.point.s - previous.s, 0.0))
-            returned = self.mirrored and one.kind in (Kind.BRANCH_POINT, Kind.FOLD) and collapsed(point)
-            if returned:  # the two families cross there
-                one = one._replace(kind=Kind.BRANCH_POINT)
+            crossing = self.mirrored and one.kind in (Kind.BRANCH_POINT, Kind.FOLD)
+            met = collapsed(point) if crossing else None
+            returned = met is not None
+            if met is not None:  # the two families cross there
+                one = one._replace(kind=Kind.BRANCH_POINT, name=met)
             self.entries.append(Entry(point, one._replace(point=point)))
             if returned or self._named_stop(one) or one.kind is Kind.GRAZING:
                 self.status = Status.CLOSED_LOOP if returned else Status.STOPPED

@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..results.solutions import FixedPoint, PeriodicOrbit
+from ..words import Kind
 from .locating import Locator
 from .points import Point
 
 __all__ = ["Home", "collapsed"]
 
+PARENT = "parent's"  # how the names of such ends begin
 _SAME, _NOTHING = 1e-5, 1e-8
 _REMEMBERED = (0, 3, 7, 12)
 _FEWEST = 4
@@ -68,19 +70,20 @@ def _invariants(point: Point) -> NDArray[np.float64]:
     return np.repeat(np.array(list(measures.values()))[:, None], 2, axis=1)
 
 
-def collapsed(point: Point) -> bool:
-    """Whether an orbit repeats itself after half its period, or stands still: a family has come back to its parents.
+def collapsed(point: Point) -> str | None:
+    """What a family has come back to where its orbit repeats itself within its period, or stands still; else None.
 
-    Doubled orbits end where they become the simple orbit twice over, orbits born at a Hopf point where they shrink to
-    an equilibrium; beyond, the same solutions follow shifted in time. Orbits that have lost a symmetry end where they
-    regain it; beyond, their images follow. Differences count relative to the states' scales.
+    Doubled orbits end where they become the simple orbit twice over ("parent's PD"), orbits born at a Hopf point where
+    they shrink to an equilibrium ("parent's HB"); beyond, the same solutions follow shifted in time. Orbits that have
+    lost a symmetry end where they regain it (""); beyond, their images follow. Differences count relative to the
+    states' scales.
     """
     if not point.spectrum.error < 1.0:
-        return False  # close to a homoclinic orbit, which stands still for nearly all of its period
+        return None  # close to a homoclinic orbit, which stands still for nearly all of its period
     mirror = getattr(point.problem, "mirror", None)
     solution = point.problem.view(point.u, point.params)
     if not isinstance(solution, PeriodicOrbit):
-        return False
+        return None
     times = np.linspace(0.0, 0.5 * solution.period, 33)
     wound = 0.5 * np.asarray(solution.winding)[:, None]
     if mirror is not None:
@@ -90,4 +93,9 @@ def collapsed(point: Point) -> bool:
     else:
         first, second = solution(times), solution(times + 0.5 * solution.period) - wound
     size = np.maximum(np.abs(first).max(axis=1), getattr(point.problem, "scales", 0.0)) + 1e-300
-    return bool((np.abs(first - second).max(axis=1) <= _COLLAPSED * size).all())
+    if not (np.abs(first - second).max(axis=1) <= _COLLAPSED * size).all():
+        return None
+    if mirror is not None:
+        return ""
+    still = np.ptp(first, axis=1) <= 2 * _COLLAPSED * size
+    return f"{PARENT} {Kind.HOPF.label if still.all() else Kind.PERIOD_DOUBLING.label}"

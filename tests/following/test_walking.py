@@ -28,12 +28,13 @@ def same(one: st.Branch, other: st.Branch) -> None:
     np.testing.assert_array_equal(one.values, other.values)
 
 
+CUBIC, ELLIPSE = one_state(a - x**3 - x), one_state(x**2 + a**2 / 4 - 1)
 CASES = {
     "from the wall": (one_state(a - x**2), (2.0, -1.0), {"start": [1.4]}),
-    "both ways": (one_state(a - x**3 - x), (-2.0, 2.0), {"start": st.solve(one_state(a - x**3 - x), a=0.5)}),
-    "closed": (one_state(x**2 + a**2 / 4 - 1), (-3.0, 3.0), {"start": st.solve(one_state(x**2 + a**2 / 4 - 1), start=[-0.9], a=0.3)}),
+    "both ways": (CUBIC, (-2.0, 2.0), {"start": st.solve(CUBIC, a=0.5)}),
+    "closed": (ELLIPSE, (-3.0, 3.0), {"start": st.solve(ELLIPSE, start=[-0.9], a=0.3)}),
     "stopped": (one_state(a - x**2), (2.0, -1.0), {"start": [1.4], "stop_at": "LP"}),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
@@ -164,7 +165,7 @@ def oscillator(time, state, *, a=0.1, w=1.0):
 def test_what_a_right_hand_side_raises_is_named() -> None:
     system = st.System.from_function(oscillator, states="u v", period="2*pi/w")
     for problem in (st.Collocation(system), st.HarmonicBalance(system, harmonics=3), st.Shooting(system)):
-        branch = st.continuation(problem, "a", (0.1, 1.0))
+        branch = st.continuation(problem, "a", (0.45, 1.0))
         assert branch.status is st.Status.STEP_TOO_SMALL and branch.parameter[-1] == pytest.approx(0.5, rel=2e-2)
         assert "ValueError: the spring broke" in branch.message, branch.message
         with pytest.raises(st.errors.StabilityError, match="ValueError: the spring broke"):
