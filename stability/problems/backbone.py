@@ -28,7 +28,6 @@ from ..errors import ConvergenceError, InputError, unknown_name
 from ..kernels.fourier import resized
 from ..protocols import Corrected, Critical, Seed, Spectrum, Tangent
 from ..results.solutions import PeriodicOrbit
-from ..words import Verdict
 from .backbone_linearisation import BackboneLinearisation
 from .backbone_system import GROWTH, driving_parameter, free_system
 from .harmonic_balance import HarmonicBalance
@@ -77,7 +76,8 @@ class Backbone:
     -----
     Parameters are those of the system and "amplitude". Columns: "omega" = 2 pi / T (under the name of the forcing
     frequency too, so that a backbone can be laid over responses), "period", "balancing_growth", extrema and amplitudes.
-    Motions of one degree of freedom are NEUTRAL; of more, UNDETERMINED (use HarmonicBalance for their stability).
+    Motions of one degree of freedom are NEUTRAL; of more, NEUTRAL or UNSTABLE by the multipliers of the conservative
+    motion (see backbone_spectrum; column "largest_multiplier"), UNDETERMINED where damping is balanced.
 
     Examples
     --------
@@ -307,9 +307,9 @@ class Backbone:
 
     # ------------------------------------------------------------------ what the driver asks besides
     def spectrum(self, linearisation: BackboneLinearisation) -> Spectrum:
-        """No multipliers; NEUTRAL for one degree of freedom (the orbits of a planar conservative system)."""
-        verdict = Verdict.NEUTRAL if self.inner.layout.n == 2 else Verdict.UNDETERMINED
-        return Spectrum(np.zeros(0, complex), 0.0, 0, 0, 0, 0, verdict)
+        """The verdict; no values, since the family's own folds are not among the events of its multipliers."""
+        found = linearisation.stability
+        return Spectrum(np.zeros(0, complex), found.error, 0, 0, 0, 0, found.verdict)
 
     def error(self, u: Array, params: Array) -> float:
         """Largest change of a state over its scale that the missing harmonics would make; inf: unknown."""
@@ -344,15 +344,20 @@ class Backbone:
         return driving_parameter(self.system)
 
     def measures(self, u: Array, params: Array) -> dict[str, float]:
-        """Columns: extrema and amplitudes as of any orbit, "omega", "period", "balancing_growth"."""
+        """Columns: extrema and amplitudes as of any orbit, "omega", "period", "balancing_growth"; of several degrees of
+        freedom "largest_multiplier", the largest modulus beside the double 1.
+        """
         columns = self.inner.measures(u[:-1], np.append(params[:-1], u[-1]))
         columns["omega"] = 2 * np.pi / float(u[-2])
         if self.driving is not None:
             columns[self.driving] = columns["omega"]
+        if self.inner.layout.n > 2:
+            values = self.linearise(u, params).stability.values
+            columns["largest_multiplier"] = float(np.abs(values).max())
         return {**columns, GROWTH: float(u[-1])}
 
     def view(self, u: Array, params: Array) -> PeriodicOrbit:
-        """The motion as a periodic orbit of the free system; its multipliers are not computed."""
+        """The motion as a periodic orbit of the free system, with its multipliers: a double 1 and the others."""
         from ..kernels.gauss import gauss_rule
 
         L = self.linearise(u, params)
@@ -362,5 +367,10 @@ class Backbone:
             named[self.driving] = 2 * np.pi / period
         return PeriodicOrbit.from_nodes(
             self.system.states, edges * period, gauss_rule(degree).abscissae, values, named,
-            verdict=self.spectrum(L).verdict, error=L.inner.correction.error, residual=L.size_of_residual,
+            multipliers=np.array(sorted([1.0, 1.0, *L.stability.values], key=_rank), complex),
+            verdict=L.stability.verdict, error=L.inner.correction.error, residual=L.size_of_residual,
         )  # fmt: skip
+
+
+def _rank(value: complex) -> float:
+    return -round(abs(value), 9)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .backbone_spectrum import ModeStability, mode_stability
 from .backbone_system import GROWTH
 from .harmonic_linearisation import HarmonicLinearisation
 
@@ -63,6 +64,11 @@ class BackboneLinearisation:
         else:
             out[:-2] = self.inner.column(name)[:-1]
         return out
+
+    @cached_property
+    def stability(self) -> ModeStability:
+        """Multipliers of the motion and the verdict (see backbone_spectrum)."""
+        return mode_stability(self.inner, float(self.u[-1]))
 
     @property
     def spectral(self) -> Array:

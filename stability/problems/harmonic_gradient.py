@@ -9,8 +9,8 @@ because velocities omega x' are products of two unknowns. For M = Re Y exp(Lambd
 Hill's matrix (all modes V, inverse U): first-order perturbation of values and vectors gives w^T dM v = sum_ab G_ab
 dHill_ab,
 
-    G = U^T C V^T,   C_ij = (w^T(mu_j - M) P V_i) b_j / (lambda_j - lambda_i),   C_jj = T mu_j (w^T P V_j) b_j,   b =
-    Y^-1 v,
+    G = U^T C V^T (of rank n),   C_ij = (w^T(mu_j - M) P V_i) b_j / (lambda_j - lambda_i),
+    C_jj = T mu_j (w^T P V_j) b_j,   b = Y^-1 v,
 
 and dHill is made of f_zz at the samples and of domega. One batched call of second derivatives each.
 """
@@ -26,7 +26,7 @@ from ..kernels.fourier import derivative
 if TYPE_CHECKING:
     from .harmonic_linearisation import HarmonicLinearisation
 
-__all__ = ["core_gradient", "spectral_gradient"]
+__all__ = ["core_gradient", "curvature", "spectral_gradient"]
 
 Array = np.ndarray
 _SAME = 1e-9
@@ -140,49 +140,48 @@ def _second(L: HarmonicLinearisation, direction: Array) -> Array:
     return np.asarray(values.reshape(width, count, -1) * (length / sizes)[:, None, None])
 
 
+def curvature(L: HarmonicLinearisation) -> Array:
+    """d2 f_r / dx_s dz_l at the samples: (N, n, n, n + m), one batched call."""
+    n, (count, width) = L.problem.layout.n, (L.problem.layout.samples, L.problem.layout.n + L.params.size)
+    sizes = _sizes(L)
+    units = np.diag(sizes)
+    first, other = np.repeat(units[:n], width * count, axis=0), np.tile(np.repeat(units, count, axis=0), (n, 1))
+    values = L.problem.evaluations.second(
+        np.tile(L.problem.phase, n * width), np.tile(L.X, (n * width, 1)), L.params, first, other
+    )
+    values = values.reshape(n, width, count, n) / (sizes[:n, None] * sizes)[:, :, None, None]
+    return np.ascontiguousarray(values.transpose(2, 3, 0, 1))
+
+
 def spectral_gradient(L: HarmonicLinearisation, w: Array, v: Array) -> tuple[Array, Array]:
     """Gradient of w^T M v by u (N,) and by p (m,)."""
-    kind = np.result_type(w, v, float)
-    by_u, by_p = np.zeros(L.u.size, kind), np.zeros(L.params.size, kind)
-    for a, w_part in _parts(w):
-        for b, v_part in _parts(v):
-            found = _real_spectral_gradient(L, w_part, v_part)
-            factor = a * b if np.iscomplexobj(by_u) else 1.0
-            by_u += factor * found[0]
-            by_p += factor * found[1]
-    return by_u, by_p
-
-
-def _real_spectral_gradient(L: HarmonicLinearisation, w: Array, v: Array) -> tuple[Array, Array]:
     problem, layout, modes = L.problem, L.problem.layout, L.modes
-    n, m, omega, T = layout.n, L.params.size, L.omega, L.period
-    w, v = w / problem.scales, v * problem.scales
-    G, by_period = _matrix_gradient(modes, w, v, T)
-    blocks = G.reshape(layout.count, n, layout.count, n)
-    weights = np.einsum("Ik,IrKs,kK->krs", layout.basis.analysis, blocks, layout.basis.synthesis, optimize=True)
-    samples = np.zeros((layout.samples, n + m))
-    sizes = _sizes(L)
-    for s in range(n):
-        if not np.any(weights[:, :, s]):
-            continue
-        unit = np.zeros((layout.samples, n + m))
-        unit[:, s] = sizes[s]
-        samples += np.einsum("lkr,kr->kl", _second(L, unit), weights[:, :, s]) / sizes[s]
+    n, omega, T = layout.n, L.omega, L.period
+    left, right, by_period = _factors(modes, w / problem.scales, v * problem.scales, T)
+    a, b = left.reshape(layout.count, n, -1), right.reshape(layout.count, n, -1)  # G = sum_j a_j b_j^T
+    at = np.tensordot(layout.basis.analysis.T, a, 1), np.tensordot(layout.basis.synthesis, b, 1)
+    weights = np.einsum("krj,ksj->krs", *at, optimize=True)
+    samples = np.einsum("krs,krsl->kl", weights, L.curvature, optimize=True)
     k, cosine, sine = np.arange(1, layout.harmonics + 1), slice(1, None, 2), slice(2, None, 2)
-    diagonal = np.einsum("IrKr->IK", blocks)
-    at_cosine, at_sine = np.diagonal(diagonal[cosine, sine]), np.diagonal(diagonal[sine, cosine])
+    by_omega = (k[:, None, None] * (a[sine] * b[cosine] - a[cosine] * b[sine])).sum()
     _, velocities = layout.pairs
-    by_omega = float((k * (at_sine - at_cosine)).sum())
-    by_omega += float((samples[:, velocities] * L.X[:, velocities]).sum()) / omega
+    by_omega += (samples[:, velocities] * L.X[:, velocities]).sum() / omega
     by_c = _pulled_back(L, samples).ravel()
     by_p = samples[:, n:].sum(axis=0)
     if problem.own:
-        return np.append(by_c, by_period - omega / T * by_omega), by_p
-    return by_c, by_p + by_omega * L.omega_slopes + by_period * L.period_slopes
+        found = np.append(by_c, by_period - omega / T * by_omega), by_p
+    else:
+        found = by_c, by_p + by_omega * L.omega_slopes + by_period * L.period_slopes
+    if np.iscomplexobj(w) or np.iscomplexobj(v):
+        return found
+    return np.real(found[0]), np.real(found[1])
 
 
-def _matrix_gradient(modes: Any, w: Array, v: Array, T: float) -> tuple[Array, float]:
-    """(G, derivative by T at fixed Hill matrix) of w^T M v; w, v in the states' own units."""
+def _factors(modes: Any, w: Array, v: Array, T: float) -> tuple[Array, Array, complex]:
+    """(A, B) with G = A B^T, and the derivative by T at fixed Hill matrix, of w^T M v; w, v in the states' own units.
+
+    The selected modes come in conjugate pairs, so that M is real and the formula holds for complex w and v too.
+    """
     chosen, values, vectors = modes.chosen, modes.values, modes.vectors
     mu, Y = modes.multipliers, modes.start[:, chosen]
     b = np.linalg.solve(Y, v.astype(complex))
@@ -193,6 +192,4 @@ def _matrix_gradient(modes: Any, w: Array, v: Array, T: float) -> tuple[Array, f
     small = np.abs(gap) < _SAME * (1 + np.abs(values[chosen]))[None, :]
     C = np.where(small, 0.0, (a[:, None] * mu - a_M[:, None]) * b / np.where(small, 1.0, gap))
     C[chosen, np.arange(len(chosen))] = a[chosen] * T * mu * b
-    G = modes.inverse.T @ C @ vectors[:, chosen].T
-    by_period = (w @ Y) @ (values[chosen] * mu * b)
-    return np.real(G), float(np.real(by_period))
+    return modes.inverse.T @ C, vectors[:, chosen], complex((w @ Y) @ (values[chosen] * mu * b))

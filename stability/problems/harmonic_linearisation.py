@@ -210,6 +210,13 @@ class HarmonicLinearisation:
         """M (n, n): real monodromy matrix whose eigenvalues are the Hill multipliers of the truncated system."""
         return np.asarray(self.modes.monodromy)
 
+    @cached_property
+    def curvature(self) -> Array:
+        """Second derivatives of the field at the samples (see harmonic_gradient)."""
+        from .harmonic_gradient import curvature
+
+        return curvature(self)
+
     def spectral_gradient(self, w: Array, v: Array) -> tuple[Array, Array]:
         """Gradient of w^T M v by u and by p."""
         from .harmonic_gradient import spectral_gradient

@@ -205,12 +205,12 @@ def warn_of_truncation(problem: HarmonicBalance, found: Correction, params: Arra
     problem._warned.add("truncation")
     more = missing_harmonics(found, problem.accuracy)
     where = ", ".join(f"{k} = {v:.6g}" for k, v in zip(problem.parameters, params.tolist()))
+    few = "harmonic is" if problem.harmonics == 1 else "harmonics are"
     remedy = f"harmonics={problem.harmonics + more}, or adaptive=True"
     if problem.adaptive:
         remedy = "a term with a kink converges slowly: Collocation is its method; or give harmonics= and a larger most="
     warnings.warn(
-        f"{problem.harmonics} harmonics are too few for '{problem.system.name}' at {where}: estimated error "
-        f"{found.error:.1e} of the states' scales, wanted {problem.accuracy:.0e}; about {more} more are missing "
-        f"({remedy})",
+        f"{problem.harmonics} {few} too few for '{problem.system.name}' at {where}: estimated error {found.error:.1e} "
+        f"of the states' scales, wanted {problem.accuracy:.0e}; about {more} more are missing ({remedy})",
         TruncationWarning, stacklevel=3,
     )  # fmt: skip

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+import sympy as sp
+from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 import stability as st
@@ -63,6 +65,56 @@ def test_modes_of_a_chain_start_at_the_linear_frequencies(mode):
     assert abs(curve.columns["omega"][0] - np.sqrt(np.sort(np.linalg.eigvals(K).real)[mode - 1])) < 1e-7
     assert np.abs(curve.columns["balancing_growth"]).max() < 1e-10
     assert curve.columns["omega"][-1] > curve.columns["omega"][0]
+
+
+def _two_masses(hardening=0.5):
+    """x'' + 2x - y + x^3/2 = 0, y'' + 2y - x = 0: Kerschen et al. (2009), MSSP 23, 170-194, section 2."""
+    t = sp.Symbol("t", real=True)
+    x, y = (sp.Function(name)(t) for name in "xy")
+    k = sp.Symbol("k", real=True)
+    return st.System.from_equations(
+        {x.diff(t, 2): y - 2 * x - k * x**3, y.diff(t, 2): x - 2 * y}, coordinates=[x, y], parameters={"k": hardening},
+        name="two masses",
+    )  # fmt: skip
+
+
+def test_stability_of_a_nonlinear_normal_mode():
+    """Small motions: exp(+-2 pi i sqrt 3), the other linear mode seen over a period of the first. Beyond the branch
+    point at 1:1 of the multipliers the mode is unstable; its multipliers by scipy's integration of the variations.
+    """
+    system = _two_masses()
+    curve = st.continuation(st.Backbone(system), "amplitude", (0.01, 3.0))
+    small = curve.solution(0).multipliers
+    assert np.allclose(sorted(small.real)[:2], np.cos(2 * np.pi * np.sqrt(3)), atol=1e-4)
+    (birth, *_) = curve.of_kind(st.Kind.BRANCH_POINT)
+    at = curve.columns["amplitude"]
+    first = np.arange(len(at)) < int(np.argmax(at > birth.params["amplitude"]))
+    assert {v for v, below in zip(curve.verdicts, first) if below} <= {st.Verdict.NEUTRAL, st.Verdict.UNDETERMINED}
+    assert sum(v is st.Verdict.NEUTRAL for v in curve.verdicts) > 10
+    for amplitude, verdict in ((2.0, st.Verdict.NEUTRAL), (2.8, st.Verdict.UNSTABLE)):
+        orbit = curve.at(amplitude=amplitude)[0]
+        assert orbit.verdict is verdict
+
+        def variations(t, z):
+            x, phi = z[:4], z[4:].reshape(4, 4)
+            J = np.array([[0, 0, 1, 0], [0, 0, 0, 1], [-2 - 1.5 * x[0] ** 2, 1, 0, 0], [1, -2, 0, 0.0]])
+            return np.concatenate([[x[2], x[3], x[1] - 2 * x[0] - x[0] ** 3 / 2, x[0] - 2 * x[1]], (J @ phi).ravel()])
+
+        start = np.concatenate([orbit(0.0), np.eye(4).ravel()])
+        end = solve_ivp(variations, (0, orbit.period), start, method="DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+        assert np.abs(end[:4] - orbit(0.0)).max() < 1e-6
+        exact = np.linalg.eigvals(end[4:].reshape(4, 4))
+        ours = orbit.multipliers[np.abs(orbit.multipliers - 1) > 1e-9]
+        assert len(ours) == 2 and np.abs(ours[:, None] - exact).min(axis=1).max() < 1e-5
+
+
+def test_a_mode_with_damping_has_no_verdict():
+    """Its growth is artificial: UNDETERMINED, and said by the column."""
+    chain = st.models.chain(xi1=0.01, xi2=0.01, mass_ratio_21=0.42, Omega0=1.0, beta1=0.1, beta2=0.03)
+    curve = st.continuation(st.Backbone(chain), "amplitude", (0.01, 0.5))
+    assert set(curve.verdicts) == {st.Verdict.UNDETERMINED}
+    assert curve.columns["balancing_growth"].min() > 1e-3
+    assert np.isfinite(curve.columns["largest_multiplier"]).all()
 
 
 def test_the_backbone_runs_through_the_phase_resonance_of_a_response():
