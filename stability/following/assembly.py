@@ -19,11 +19,13 @@ from .loops import Home
 from .points import Point, dot, rescaled, smooth_tests
 from .settings import Settings
 from .walking import Walk, ended
+from .walls import on_wall
 
 __all__ = ["assemble", "resumed", "turned"]
 
 Array = NDArray[np.float64]
 _MERGE = 1e-10
+_TWINS = (1e-5, 2e-2)  # how far apart a fold and a branch point that may be one can be: parameter, arclength
 _PAST = 4  # points that the predictor looks at
 _CRITICAL = (Kind.FOLD, Kind.BRANCH_POINT, Kind.PERIOD_DOUBLING, Kind.NEIMARK_SACKER, Kind.HOPF)
 
@@ -45,14 +47,19 @@ def _merged(entries: list[Entry]) -> list[Entry]:
 
 
 def _without_twins(entries: list[Entry]) -> list[Entry]:
-    """A branch is vertical where it crosses its parent at a pitchfork: a fold found beside that point is the point."""
+    """A branch is vertical where it crosses its parent at a pitchfork: a fold found beside that point is the point.
+
+    A mesh that is not the same in both halves of a symmetric orbit unfolds the pitchfork by its error.
+    """
     marked = [k for k, e in enumerate(entries) if e.found is not None]
     drop = set()
     for i, j in pairwise(marked):
         kinds = {entries[i].found.kind: i, entries[j].found.kind: j}  # type: ignore[union-attr]
         p, q = entries[i].point, entries[j].point
-        near = abs(p.parameter - q.parameter) * p.tangent.weight < 1e-8 and abs(p.s - q.s) < 2e-4
-        if near and set(kinds) == {Kind.FOLD, Kind.BRANCH_POINT}:
+        gap, apart = abs(p.parameter - q.parameter) * p.tangent.weight, abs(p.s - q.s)
+        if set(kinds) != {Kind.FOLD, Kind.BRANCH_POINT} or not (gap < _TWINS[0] and apart < _TWINS[1]):
+            continue
+        if (gap < 1e-8 and apart < 2e-4) or gap < 3 * max(r.problem.error(r.u, r.params) for r in (p, q)):
             drop.add(kinds[Kind.FOLD])
     return [e for k, e in enumerate(entries) if k not in drop]
 
@@ -237,6 +244,8 @@ def _restarted(branch: Branch, settings: Settings, end: int) -> Follower | None:
         return None  # beyond it these solutions mean nothing
     sign, inward = (1, -1) if end else (-1, 1)
     chain = [_point_from(branch, i, settings, 0.0, sign)]
+    if at_wall and on_wall(chain[0]):
+        return None
     k = i + inward
     while 0 <= k < len(branch) and len(chain) < _PAST:
         # neighbours as the driver met them: accepted points only, on one mesh

@@ -34,6 +34,7 @@ from .points import Point, dot, make_point, rescaled
 from .searching import between, hopped
 from .settings import Progress, Settings
 from .stepping import KINK, Comparison, compare, next_length, predict
+from .walls import landing, on_wall
 
 __all__ = ["Entry", "Follower"]
 
@@ -190,11 +191,9 @@ class Follower(Iterator[Point]):
         """An accepted point, or the factor by which to shorten the step."""
         settings, last = self.settings, self.last
         u, parameter = predict(last, self._past, h)
-        wall, aside = self._wall(parameter), passed(last.problem, u)
-        if wall is not None:
-            return self._land(wall, h)
-        if aside is not None:
-            return self._land_aside(aside, h)
+        landed = self._landed(parameter, u, h)
+        if landed is not None:
+            return landed
         params = last.params.copy()
         params[settings.index] = parameter
         try:
@@ -205,53 +204,18 @@ class Follower(Iterator[Point]):
         if not found.converged or found.tangent is None:
             self.note = found.note
             return 0.4
-        wall, aside = self._wall(float(found.params[settings.index])), passed(last.problem, found.u)
-        if wall is not None:
-            return self._land(wall, h)
-        if aside is not None:
-            return self._land_aside(aside, h)
-        return self._judged(found, found.tangent, h, (u, parameter))
+        landed = self._landed(float(found.params[settings.index]), found.u, h)
+        return self._judged(found, found.tangent, h, (u, parameter)) if landed is None else landed
 
-    def _wall(self, parameter: float) -> float | None:
-        if parameter < self.settings.low:
-            return self.settings.low
-        return self.settings.high if parameter > self.settings.high else None
-
-    def _land(self, wall: float, h: float) -> tuple[Point, Comparison] | float:
-        """Solve at the window end itself, if it is about one step away."""
-        settings, last = self.settings, self.last
-        rate = last.tangent.parameter
-        if last.parameter == wall:
-            return 0.5 if rate * (wall - 0.5 * (settings.low + settings.high)) < 0 else 0.25
-        reach = (wall - last.parameter) / rate if rate else math.inf
-        if not 0 < reach <= 2 * h:
+    def _landed(self, parameter: float, u: Array, h: float) -> tuple[Point, Comparison] | float | None:
+        """A solve on the wall beyond which (u, parameter) lies; None: beyond none."""
+        made = landing(self.last, partial(predict, self.last, self._past), self.settings, u, parameter, h)
+        if made is None:
+            return None
+        if isinstance(made, str):
+            self.note = made or self.note
             return 0.5
-        u, _ = predict(last, self._past, reach)
-        params = last.params.copy()
-        params[settings.index] = wall
-        found = last.problem.correct(u, params, settings.name, None, 0.0, settings.tolerance)
-        if not found.converged or found.tangent is None:
-            self.note = f"at the end of the window: {found.note}"
-            return 0.5
-        slope, weight, w = found.tangent, settings.weight, last.problem.weights
-        size = math.sqrt(dot(w, slope.u, slope.u) + weight**2)
-        side = dot(w, slope.u, last.tangent.u) + weight**2 * rate
-        size = math.copysign(size, side)
-        tangent = Tangent(slope.u / size, 1.0 / size, weight)
-        signed = found._replace(determinant_sign=found.determinant_sign * (1 if size > 0 else -1))
-        return self._judged(signed, tangent, reach, (u, wall))
-
-    def _land_aside(self, wall: Wall, h: float) -> tuple[Point, Comparison] | float:
-        """Solve on a wall of one of the unknowns, if it is about one step away."""
-        reach = reach_of(self.last, wall)
-        if not 0 < reach <= 2 * h:
-            return 0.5
-        guess = predict(self.last, self._past, reach)
-        solved = solved_on(self.last, wall, guess, self.settings.name, self.settings.index, self.settings.tolerance)
-        if solved is None or self._wall(float(solved[0].params[self.settings.index])) is not None:
-            self.note = "at the end of the other parameter's window"
-            return 0.5
-        return self._judged(*solved, reach, guess)
+        return self._judged(*made)
 
     def _judged(
         self, found: Corrected, tangent: Tangent, h: float, guess: tuple[Array, float]
@@ -381,7 +345,7 @@ class Follower(Iterator[Point]):
         if not found.converged or found.tangent is None:
             return
         parameter = float(found.params[settings.index])
-        if self._wall(parameter) is not None:
+        if not self.settings.low <= parameter <= self.settings.high:
             return
         new = make_point(problem, found, found.tangent, settings.index, old.s, old.step)
         if not changes(old, new).nothing:
@@ -431,8 +395,8 @@ class Follower(Iterator[Point]):
                 if (p.parameter - value) * (q.parameter - value) < 0:
                     point = self.locator.at_parameter(p, q, value)
                     if point is None:
-                        gap = partial(_gap, value)
-                        point = self.locator.zero(p, q, gap, gap(p), gap(q))
+                        ends = p.parameter - value, q.parameter - value
+                        point = self.locator.zero(p, q, partial(_gap, value), *ends)
                     if point is not None:
                         found.append(Found(point, Kind.USER, (p.parameter, q.parameter), 0.0))
         return found

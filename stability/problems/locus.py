@@ -48,6 +48,7 @@ class Locus:
     kind : Kind
     free : str, the second parameter lambda_2;  along : str, the one along which the point was found
     scale : float, size of lambda_2 in the inner product
+    window : (low, high) of lambda_2: the curve ends there
     """
 
     inner: Any
@@ -55,6 +56,7 @@ class Locus:
     free: str
     along: str
     scale: float
+    window: tuple[float, float] = (-math.inf, math.inf)
     born: tuple[Array, Array, Array, float] | None = field(default=None, repr=False)  # U, params, direction, rate
     _memo: dict[str, Any] = field(default_factory=dict, repr=False)
 
@@ -90,6 +92,11 @@ class Locus:
         return np.concatenate([self.inner.weights, [self.scale**-2], np.zeros(self.extras)])
 
     @property
+    def walls(self) -> tuple[tuple[int, float, float], ...]:
+        """(place of lambda_2 counted from the end of U, low, high)."""
+        return ((-1 - self.extras, *self.window),)
+
+    @property
     def critical(self) -> Critical:
         """No special points of its own by spectrum."""
         return Critical(self.inner.critical.circle, None, None)
@@ -106,7 +113,8 @@ class Locus:
         born = None if self.born is None else [np.asarray(part).tolist() for part in self.born]
         inner = dict(self.inner.spec)
         flag = {"view_only": True} if inner.get("view_only") else {}
-        return {**own, "scale": self.scale, "born": born, "inner": inner, **flag}
+        window = [v if math.isfinite(v) else None for v in self.window]
+        return {**own, "scale": self.scale, "window": window, "born": born, "inner": inner, **flag}
 
     @classmethod
     def from_spec(cls, spec: Mapping[str, Any]) -> Locus:
@@ -115,6 +123,8 @@ class Locus:
         if born is not None:
             born = (*(np.array(part, dtype=float) for part in born[:3]), float(born[3]))
         fields = {key: spec[key] for key in ("free", "along", "scale")}
+        low, high = spec.get("window", (None, None))
+        fields["window"] = (-math.inf if low is None else low, math.inf if high is None else high)
         return cls(revive(spec["inner"]), Kind(spec["kind"]), born=born, **fields)
 
     # ------------------------------------------------------------------ start

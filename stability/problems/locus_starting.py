@@ -26,7 +26,9 @@ Array = NDArray[np.float64]
 _SMALLEST_SCALE = 0.05  # of the second parameter, relative to its default
 
 
-def locus(point: SpecialPoint, *, free: str, along: str | None = None) -> Locus:
+def locus(
+    point: SpecialPoint, *, free: str, along: str | None = None, window: tuple[float, float] | None = None
+) -> Locus:
     """The curve of special points like `point` in two parameters; give it to `continuation`.
 
     F(u, lambda_1, lambda_2) = 0 together with the condition of the point's kind: multiplier +1 (fold, branch point),
@@ -40,6 +42,8 @@ def locus(point: SpecialPoint, *, free: str, along: str | None = None) -> Locus:
         The second parameter, which becomes an unknown; its values are the column of that name.
     along : str or None
         The parameter that `continuation` will follow; by default the one of the branch on which the point was found.
+    window : (low, high) or None
+        Where the curve ends in `free`, inside the system's bounds of that parameter (which are the default).
 
     Returns
     -------
@@ -84,20 +88,45 @@ def locus(point: SpecialPoint, *, free: str, along: str | None = None) -> Locus:
         )
     for name in (free, along):
         getattr(problem, "check_free", _anything)(name)
-    return _born(problem, point, free, along)
+    return _born(problem, point, free, along, _window(problem, point, free, window))
+
+
+def _window(
+    problem: Problem, point: SpecialPoint, free: str, window: tuple[float, float] | None
+) -> tuple[float, float]:
+    """The window of the second parameter, checked: inside the bounds, with the point in it."""
+    bounds = getattr(getattr(problem, "system", None), "bounds", {}).get(free, (-math.inf, math.inf))
+    lowest, highest = (float(v) for v in bounds)
+    if window is None:
+        return lowest, highest
+    try:
+        low, high = sorted(float(v) for v in window)
+    except (TypeError, ValueError):
+        raise InputError(f"the window of '{free}' must be two numbers (low, high), got {window!r}") from None
+    if not low < high:
+        raise InputError(f"the window of '{free}' must be two different numbers, got ({low:g}, {high:g})")
+    if not lowest <= low < high <= highest:
+        raise InputError(
+            f"the window ({low:g}, {high:g}) leaves the bounds [{lowest:g}, {highest:g}] of the parameter '{free}'"
+        )
+    if not low <= point.params[free] <= high:
+        raise InputError(
+            f"{point.label} lies at {free} = {point.params[free]:.10g}, outside the window ({low:g}, {high:g})"
+        )
+    return low, high
 
 
 def _anything(name: str) -> None:
     """Problems without a symmetry let every parameter go."""
 
 
-def _born(problem: Problem, point: SpecialPoint, free: str, along: str) -> Locus:
+def _born(problem: Problem, point: SpecialPoint, free: str, along: str, window: tuple[float, float]) -> Locus:
     params = point.params_vector
     second = point.params[free]
     kind = point.defining_kind
     extra = first_extra(kind, problem.critical, point.critical_values)
     scale = max(abs(second), _SMALLEST_SCALE * (abs(problem.parameters[free]) or 1.0))
-    curve = Locus(problem, kind, free, along, scale)
+    curve = Locus(problem, kind, free, along, scale, window)
     U = np.concatenate([point.u, [second], extra])
     try:
         L = ExtendedLinearisation.at(curve, U, params, along)

@@ -105,3 +105,51 @@ def test_curves_that_cross(slope):
         exact = [0.0, -0.5 - slope]
         want = sorted(v for v in exact if abs(v) < 0.9)
         assert sorted(p.params["a"] for p in crossings) == pytest.approx(want, abs=1e-6)
+
+
+# ---------------------------------------------------------------------- windows of the second parameter
+def fold_of_parabola():
+    """The fold of x' = a - x^2 - b (x - 1) at b = 0.5."""
+    problem = st.Equilibrium(scalar(a - x**2 - b * (x - 1), a=1.0, b=0.5))
+    return st.continuation(problem, "a", (4.0, -4.0), start=dict(x=2.0))["LP1"]
+
+
+@pytest.mark.parametrize("window", [(-1.5, 0.75), (0.75, -1.5), [-1.5, 0.75]])
+def test_a_curve_ends_exactly_at_the_window_of_the_second_parameter(window, tmp_path):
+    """Folds of x' = a - x^2 - b (x - 1): x = -b/2, a = -b^2/4 - b; both ends are on the walls, points as without."""
+    point = fold_of_parabola()
+    curve = st.continuation(st.locus(point, free="b", window=window), "a", (-4.0, 4.0))
+    b_, a_ = curve.columns["b"], curve.columns["a"]
+    assert sorted((b_[0], b_[-1])) == [-1.5, 0.75] and curve.statuses == (st.Status.PARAMETER_BOUND,) * 2
+    assert np.abs(a_ + b_**2 / 4 + b_).max() < 1e-12
+    assert b_.min() == -1.5 and b_.max() == 0.75
+    curve.save(tmp_path / "curve.npz")
+    again = st.load(tmp_path / "curve.npz")
+    assert again.meshes[0]["window"] == [-1.5, 0.75] and again.extend().statuses == curve.statuses
+
+
+def test_the_window_of_the_followed_parameter_comes_first_where_it_is_nearer():
+    point = fold_of_parabola()
+    curve = st.continuation(st.locus(point, free="b", window=(-50.0, 50.0)), "a", (-1.0, 4.0))
+    assert curve.columns["a"][[0, -1]].tolist() == [-1.0, -1.0]
+    assert sorted(curve.columns["b"][[0, -1]]) == pytest.approx([-2 - 2 * np.sqrt(2), -2 + 2 * np.sqrt(2)], abs=1e-9)
+
+
+def test_bounds_of_the_system_are_walls():
+    """The same with b bounded from below by the model itself: the curve does not leave it."""
+    system = st.System(
+        name="bounded", coordinates=("x",), states=("x",), parameters={"a": 1.0, "b": 0.5}, bounds={"b": (0.1, 2.0)},
+        rhs=(a - x**2 - b * (x - 1),),
+    )  # fmt: skip
+    branch = st.continuation(st.Equilibrium(system), "a", (4.0, -4.0), start=dict(x=2.0))
+    curve = st.continuation(st.locus(branch["LP1"], free="b"), "a", (-4.0, 4.0))
+    assert sorted(curve.columns["b"][[0, -1]]) == [0.1, 2.0]
+    with pytest.raises(st.errors.InputError, match="leaves the bounds"):
+        st.locus(branch["LP1"], free="b", window=(0.0, 1.0))
+
+
+@pytest.mark.parametrize("window, message", [((1.0, 2.0), "outside the window"), ((0, 0), "different"), (3, "two numbers")])
+def test_windows_that_make_no_sense(window, message):
+    point = fold_of_parabola()
+    with pytest.raises(st.errors.InputError, match=message):
+        st.locus(point, free="b", window=window)
