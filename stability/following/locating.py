@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from ..problems.defining import Located, locate
 from ..protocols import Tangent
 from ..words import Kind
-from .events import Changes, changes, supported
+from .events import Changes, changes, supported, turns
 from .points import Point, dot, make_point, smooth_tests, tangent_of
 
 __all__ = ["Found", "Locator", "hermite", "shown"]
@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 _PAIRS = (Kind.HOPF, Kind.NEIMARK_SACKER)
 _AMBIGUOUS = 10  # halvings after which the simplest explanation of a change is taken
 _EDGE = 1e-6  # how far outside its bracket, in units of the bracket, a located point may lie
+_TURN = 0.05  # longest segment in which a turn is taken for a part of a branch point
 _ONE_PLACE = 2e-4  # scaled distance below which a fold and a branch point of one parameter value are one
 _UNFOLDING = 1e-10  # a perturbed crossing is no branch point: its unfolding parameter is not zero
 _SIGNATURE = 1e-5  # how close to the limit the critical value of a located point must be
@@ -160,7 +161,7 @@ class Locator:
         critical = a.problem.critical
         kinds = change.suspects(critical.pair, critical.minus is not None)
         located = [f for f in (self.attempt(kind, a, b) for kind in kinds) if f is not None]
-        if _is_turning_crossing(change, located, chord_length(a, b)):
+        if _is_turning_crossing(change, located, chord_length(a, b)) or self._turns_at_crossing(a, b, change, located):
             located = [f for f in located if f.kind is not Kind.FOLD]
             if len(located) == 1 and not change.collision:
                 return located
@@ -175,6 +176,24 @@ class Locator:
         if middle is None:
             return [] if change.nothing else self._leftover(a, b, change)
         return self.resolve(a, middle, level + 1) + self.resolve(middle, b, level + 1)
+
+    def _turns_at_crossing(self, a: Point, b: Point, change: Changes, located: list[Found]) -> bool:
+        """Whether only a branch point could be located where the parameter turns too, and the turn is right there.
+
+        A pitchfork met on its own side branch: outside a small part of the segment around it nothing happens, and in it
+        the rate of the parameter vanishes where the point is.
+        """
+        if not (change.fold and change.branch and [f.kind for f in located] == [Kind.BRANCH_POINT]):
+            return False
+        crossing = located[0].point
+        x = (crossing.s - a.s) / (b.s - a.s) if b.s > a.s else math.nan
+        if not 0 < x < 1 or chord_length(a, b) > _TURN:
+            return False
+        p, q = (self.on_curve(a, b, y) for y in (max(x - 0.1, x / 2), min(x + 0.1, (1 + x) / 2)))
+        if p is None or q is None or not (changes(a, p).nothing and changes(q, b).nothing and turns(p, q)):
+            return False
+        zero = p.s + (q.s - p.s) * p.tangent.parameter / (p.tangent.parameter - q.tangent.parameter)
+        return abs(zero - crossing.s) < 0.1 * (q.s - p.s)
 
     def _separate(self, a: Point, b: Point, located: list[Found]) -> bool:
         """Whether the changes between points taken midway between the located events are one event each."""

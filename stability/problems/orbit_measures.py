@@ -1,9 +1,10 @@
 """What is recorded of an orbit at every point of a branch, and the orbit a user sees.
 
 Every discretisation gives its orbit as polynomials on pieces of the period (`pieces`). Extrema are those
-of the polynomial; <x>.amplitude(1) = 2 |c_1| is the first
-harmonic of the orbit's own period, c_1 = int_0^1 x(s) exp(-2 pi i s) ds by Gauss quadrature. An orbit solved on half
-of its period is unfolded by its symmetry first: x(s + 1/2) = S x(s).
+of the polynomial; <x>.amplitude(1) = 2 |c_1| is the response at the forcing frequency (autonomous: at the orbit's own),
+c_k = int_0^1 x(s) exp(-2 pi i k m s) ds by Gauss quadrature, m forcing periods per orbit. An orbit of m > 1 periods has
+its subharmonic response besides, amplitude(1/m) = 2 |c_(1/m)|. An orbit solved on half of its period is unfolded by its
+symmetry first: x(s + 1/2) = S x(s).
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def _to_monomials(degree: int) -> Array:
 
 
 def orbit_measures(problem: OrbitDiscretisation, u: Array, params: Array) -> dict[str, float]:
-    """Columns: <state>.max, <state>.min, <coordinate>.amplitude(1), <output>.max, .min, .mean, period."""
+    """Columns: <state>.max, .min, <coordinate>.amplitude(1), .amplitude(1/m), <output>.max, .min, .mean, period."""
     degree, edges, values, period = problem.pieces(u, params)
     rule, states = gauss_rule(degree), problem.system.states
     C = np.ascontiguousarray(np.einsum("ki,jin->jkn", _to_monomials(degree), values))
@@ -48,9 +49,12 @@ def orbit_measures(problem: OrbitDiscretisation, u: Array, params: Array) -> dic
     stages = values[:, 1:].reshape(len(points), len(states))
     turning = problem.whole_winding
     swing = stages - points[:, None] * turning if turning.any() else stages
-    harmonic = (weights * np.exp(-2j * np.pi * points)) @ swing
-    for k, name in enumerate(problem.system.coordinates):
-        out[f"{name}.amplitude(1)"] = 2 * abs(complex(harmonic[k]))
+    periods = problem.forcing_periods
+    orders = {"1": periods} | ({f"1/{periods}": 1} if periods > 1 else {})
+    for label, number in orders.items():
+        harmonic = (weights * np.exp(-2j * np.pi * number * points)) @ swing
+        for k, name in enumerate(problem.system.coordinates):
+            out[f"{name}.amplitude({label})"] = 2 * abs(complex(harmonic[k]))
     out["period"] = period
     if problem.evaluations.output_names:
         phase = np.mod(problem.multiple * points, 1.0)
@@ -78,7 +82,7 @@ def orbit_view(problem: OrbitDiscretisation, u: Array, params: Array) -> Periodi
         problem.system.states, edges * period, gauss_rule(degree).abscissae, values,
         dict(zip(problem.parameters, params.tolist())), multipliers=multipliers, verdict=spectrum.verdict,
         error=problem.error(u, params), residual=linearisation.size_of_residual,
-        winding=problem.whole_winding, half_multipliers=halves,
+        winding=problem.whole_winding, half_multipliers=halves, multiple=problem.forcing_periods,
     )  # fmt: skip
 
 

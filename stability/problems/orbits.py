@@ -85,6 +85,11 @@ class OrbitDiscretisation:
         return 0 if self.flow.forced else 1
 
     @property
+    def forcing_periods(self) -> int:
+        """Forcing periods that an orbit covers; 1 for autonomous systems."""
+        return 1 if self.own else self.multiple
+
+    @property
     def parameters(self) -> Mapping[str, float]:
         """Those of the system."""
         return self.system.parameters  # type: ignore[no-any-return]

@@ -5,9 +5,11 @@ s = 2 (t - e_j)/(e_(j+1) - e_j) - 1, with Chebyshev polynomials T_i: every metho
 Fourier series) has this form or is brought to it within rounding. Extrema are those of the interpolant (roots of its
 derivative), not of mesh points; harmonics are integrals over it,
 
-    c_k = 1/T int_0^T x(t) exp(-2 pi i k t / T) dt,     amplitude_k = 2 |c_k|  (|c_0| for k = 0),
+    c_k = 1/T int_0^T x(t) exp(-2 pi i k m t / T) dt,     amplitude_k = 2 |c_k|  (|c_0| for k = 0),
 
-k counting harmonics of the orbit's own period. Angles that wind, x(T) = x(0) + 2 pi w, carry ``winding`` = 2 pi w.
+for an orbit of m forcing periods (T = m times the forcing's; m = 1 of an autonomous one). So k counts in the forcing
+frequency: amplitude(1) is the response at it, whatever the period, and a doubled orbit has amplitude(1/2), (3/2), ...
+besides. Angles that wind, x(T) = x(0) + 2 pi w, carry ``winding`` = 2 pi w.
 """
 
 from __future__ import annotations
@@ -129,6 +131,7 @@ class PeriodicOrbit:
     winding : (n,) float, x(T) - x(0)
     half_multipliers : (k,) complex or None, of the half-period map S^-1 Phi(T/2) of an orbit x(t + T/2) = S x(t) that
         was solved on half of its period; their squares are `multipliers`
+    multiple : int, forcing periods that the orbit covers (2 after a period doubling); 1 for autonomous systems
 
     Examples
     --------
@@ -148,6 +151,7 @@ class PeriodicOrbit:
     residual: float = 0.0
     winding: NDArray[np.float64] | None = None
     half_multipliers: NDArray[np.complex128] | None = None
+    multiple: int = 1
 
     def __post_init__(self) -> None:
         states = tuple(self.states)
@@ -276,21 +280,39 @@ class PeriodicOrbit:
         """State -> smallest value over a period, of the interpolant."""
         return _named(self.states, self._extrema[1])
 
-    def harmonic(self, k: int) -> NDArray[np.complex128]:
-        """(n,) Fourier coefficient c_k of the orbit's own period (a winding angle: of x - winding t / T)."""
+    def harmonic(self, k: float) -> NDArray[np.complex128]:
+        """(n,) Fourier coefficient c_k (a winding angle: of x - winding t / T); k counts in the forcing frequency.
+
+        Raises
+        ------
+        InputError
+            k is no multiple of 1/m, m forcing periods per orbit.
+        """
+        number = self._order(k)
         degree = self.coefficients.shape[1] - 1
-        count = degree + 8 + int(4 * abs(k) / (self.edges.size - 1))
+        count = degree + 8 + int(4 * abs(number) / (self.edges.size - 1))
         s, w = np.polynomial.legendre.leggauss(count)
         times = self.edges[:-1, None] + np.diff(self.edges)[:, None] * (0.5 + 0.5 * s)
         weights = (np.diff(self.edges)[:, None] * (0.5 * w)).ravel() / self.period
         values = self._values(times.ravel()) - times.ravel()[:, None] / self.period * np.asarray(self.winding)
-        return (weights * np.exp(-2j * np.pi * k * times.ravel() / self.period)) @ values
+        return (weights * np.exp(-2j * np.pi * number * times.ravel() / self.period)) @ values
 
-    def amplitude(self, k: int = 1) -> Mapping[str, float]:
-        """State -> amplitude 2 |c_k| of harmonic k of the orbit's own period (k = 0: the mean)."""
-        if not isinstance(k, (int, np.integer)) or k < 0:
-            raise InputError(f"harmonic number {k!r}: a whole number >= 0 is needed")
-        c = self.harmonic(int(k))
+    def _order(self, k: float) -> int:
+        """k of the forcing as a harmonic number of the orbit's own period."""
+        try:
+            number = float(k) * self.multiple
+        except (TypeError, ValueError):
+            raise InputError(f"harmonic number {k!r}: a number is needed") from None
+        if not np.isfinite(number) or abs(number - round(number)) > 1e-9 * self.multiple:
+            allowed = "a whole number" if self.multiple == 1 else f"a multiple of 1/{self.multiple}"
+            raise InputError(f"harmonic number {k!r}: {allowed} is needed, k counts in the forcing frequency")
+        return round(number)
+
+    def amplitude(self, k: float = 1) -> Mapping[str, float]:
+        """State -> amplitude 2 |c_k| at k times the forcing frequency (k = 0: the mean; k = 1/2 of a doubled orbit)."""
+        if isinstance(k, str) or not float(k) >= 0:
+            raise InputError(f"harmonic number {k!r}: a number >= 0 is needed")
+        c = self.harmonic(k)
         return _named(self.states, c.real if k == 0 else 2 * np.abs(c))
 
     def plot(self, ax: Any = None, x: str | None = None, y: str | None = None, **style: Any) -> Any:
@@ -312,6 +334,7 @@ class PeriodicOrbit:
             "verdict": str(self.verdict),
             "error": float(self.error),
             "residual": float(self.residual),
+            "multiple": self.multiple,
         }
         arrays = {"edges": self.edges, "coefficients": self.coefficients, "multipliers": self.multipliers}
         if self.half_multipliers is not None:
@@ -323,4 +346,4 @@ class PeriodicOrbit:
         """The inverse of `to_storage`."""
         fields: dict[str, Any] = {k: header[k] for k in ("states", "params", "verdict", "error", "residual")}
         fields |= {k: arrays[k] for k in ("edges", "coefficients", "multipliers", "winding")}
-        return cls(**fields, half_multipliers=arrays.get("half_multipliers"))
+        return cls(**fields, half_multipliers=arrays.get("half_multipliers"), multiple=int(header.get("multiple", 1)))

@@ -126,3 +126,26 @@ def test_the_default_set_has_its_torus_points_between_the_resonances():
     for point in swing.of_kind(st.Kind.NEIMARK_SACKER):
         pair = [m for m in point.multipliers if m.imag > 1e-3]
         assert min(abs(abs(m) - 1) for m in pair) < 1e-7
+
+
+def test_amplitudes_of_the_doubled_branch_count_in_the_forcing_frequency():
+    """theta answers at half of the forcing's frequency, u at the whole: u.amplitude(1) of both branches is one curve.
+
+    Witness: at the point of birth the doubled orbit is the semi-trivial one twice over; the harmonics of its samples.
+    """
+    system = pendulum(10.0, 0.2)
+    semi = st.continuation(st.Collocation(system), "Omega", (0.5, 1.6))
+    swing = st.continuation(st.switch(semi["PD1"]), "Omega", (0.5, 1.6), max_points=12)
+    assert {"u.amplitude(1)", "u.amplitude(1/2)", "theta.amplitude(1/2)"} <= set(swing.columns)
+    assert "u.amplitude(1/2)" not in semi.columns
+    at = int(np.argmin(np.abs(semi.parameter - semi["PD1"].params["Omega"])))
+    assert swing.columns["u.amplitude(1)"][0] == pytest.approx(semi.columns["u.amplitude(1)"][at], rel=1e-9)
+    orbit = swing.solution(-1)
+    samples = orbit(np.linspace(0, orbit.period, 512, endpoint=False))
+    spectrum = 2 * np.abs(np.fft.rfft(samples, axis=1)) / 512
+    assert orbit.multiple == 2
+    assert orbit.amplitude(0.5)["theta"] == pytest.approx(spectrum[1, 1], rel=1e-9)
+    assert spectrum[1, 1] > 0.1 * orbit.max["theta"]
+    assert swing.columns["theta.amplitude(1/2)"][-1] == pytest.approx(spectrum[1, 1], rel=1e-8)
+    assert swing.columns["u.amplitude(1)"][-1] == pytest.approx(spectrum[0, 2], rel=1e-8)
+    assert swing.columns["theta.amplitude(1)"][-1] < 1e-9 and swing.columns["u.amplitude(1/2)"][-1] < 1e-9

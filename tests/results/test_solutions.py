@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -91,3 +92,19 @@ def test_objects_cannot_be_stored(tmp_path: Path) -> None:
     with pytest.raises(InputError):
         write(tmp_path / "x.npz", "note", {"f": print}, {})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_harmonics_of_a_doubled_orbit_count_in_the_forcing_frequency() -> None:
+    """x = 3 cos t + 0.5 cos t/2 + 0.25 sin 3t/2 over two periods of the forcing."""
+
+    def x(t):
+        return np.array([3 * np.cos(t) + 0.5 * np.cos(t / 2) + 0.25 * np.sin(1.5 * t)])
+
+    orbit = st.PeriodicOrbit.from_function(("x",), x, 4 * np.pi, multiple=2)
+    found = [orbit.amplitude(k)["x"] for k in (0, 0.5, 1, Fraction(3, 2), 2)]
+    assert found == pytest.approx([0, 0.5, 3, 0.25, 0], abs=1e-12)
+    for wrong in (1 / 3, 0.25, -1, "1/2", float("nan")):
+        with pytest.raises(InputError, match="harmonic number"):
+            orbit.amplitude(wrong)
+    header, arrays = orbit.to_storage()
+    assert st.PeriodicOrbit.from_storage(header, arrays).amplitude(0.5)["x"] == pytest.approx(0.5)
