@@ -303,22 +303,17 @@ class Collocation(OrbitDiscretisation):
         rule = mesh.rule
         status, iterations, residual, sign, x = kernels.newton(
             kernels.solvers(), self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h,
-            rule.inverse, rule.matrix, rule.row_sums, rule.update, self.kept, self.position, self.closure,
-            self.winding, self.scales, weights,
-            mesh.split(weights)[1], params, index, u, nodes, stages, work.T, arc, t, mesh.split(t)[1], t_l, weight,
-            float(ds), float(tolerance), limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU,
-            work.pivots, work.Z, work.M,
+            rule.inverse, rule.matrix, rule.row_sums, rule.update, rule.weights, rule.leading, self.kept,
+            self.position, self.closure, self.winding, self.scales, weights, mesh.split(weights)[1], params, index, u,
+            nodes, stages, work.T, arc, t, mesh.split(t)[1], t_l, weight, float(ds), float(tolerance),
+            limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU, work.pivots, work.Z, work.M,
+            work.spectral, work.facts,
         )  # fmt: skip
         if status != kernels.CONVERGED:
             note = _NOTES.get(status) or self._not_finite(mesh, work)
             return Corrected(u, params, None, float(residual), iterations, 0, None, False, note)
-        direction = x[1, : mesh.size]
-        if tangent is None:
-            new = Tangent(direction, 1.0, 1.0)
-        else:
-            size = math.sqrt(float(np.dot(weights * direction, direction)) + (weight * float(x[1, -1])) ** 2)
-            direction = direction / size
-            new = Tangent(direction, float(x[1, -1]) / size, weight)
+        work.complete = True
+        new = Tangent(x[1, : mesh.size], float(x[1, -1]) if arc else 1.0, weight if arc else 1.0)
         linearisation: Any = work
         if mesh is self.mesh:
             correction = (x[0, : mesh.size], float(x[0, -1]) if arc else 0.0, index)
@@ -410,6 +405,8 @@ class Collocation(OrbitDiscretisation):
 
     def _growth_of_volume(self, linearisation: CollocationLinearisation) -> float:
         """int tr J dt over the span of the mesh, by the mesh's own Gauss quadrature."""
+        if linearisation.work.complete:
+            return float(linearisation.work.facts[1])
         J, n = linearisation.work.J, self.mesh.n
         mean = self.mesh.weights @ J.reshape(len(J), n * n)
         return linearisation.sigma * float(mean[:: n + 1].sum())

@@ -119,27 +119,31 @@ def multiplier_error(
     Where no multiplier is near the circle, the change at an earlier point of the same mesh is carried over, times
     3 and the square of the growth of the m-th derivative (up to 2): nodes have twice the order of the polynomial.
     """
-    carried, _ = carried_errors(problem, linearisation.solution)
+    work, solution = linearisation.work, linearisation.solution
+    roughness = float(work.facts[0]) if work.complete else _roughness(problem, solution)
+    carried, _ = carried_errors(problem, solution, roughness)
     if min((abs(abs(z) - 1) for z in values.tolist()), default=1.0) > 1e3 * carried + 1e-5:
         return carried
-    step = refined(problem, linearisation.solution, linearisation.solution_params)
+    step = refined(problem, solution, linearisation.solution_params)
     if step is None:
         return math.inf
     other = problem.spectral_of(step[2].M)
     if direction is not None:
         other = deflated(other, direction)[0]
     error = spectrum_distance(values, eigenvalues(other))
-    nodes = node_error(problem, linearisation.solution, linearisation.solution_params)
-    problem._memo["level"] = (max(error, 1e-15), nodes, _roughness(problem, linearisation.solution))
+    nodes = node_error(problem, solution, linearisation.solution_params)
+    problem._memo["level"] = (max(error, 1e-15), nodes, roughness)
     return error
 
 
-def carried_errors(problem: Collocation, u: Array) -> tuple[float, float]:
+def carried_errors(problem: Collocation, u: Array, roughness: float | None = None) -> tuple[float, float]:
     """Errors of multipliers and nodes carried from an earlier point of the same mesh (see above); inf: unknown."""
     known = problem._memo.get("level")
     if known is None:
         return math.inf, math.inf
-    growth = _roughness(problem, u) / known[2] if known[2] > 0 else math.inf
+    if roughness is None:
+        roughness = _roughness(problem, u)
+    growth = roughness / known[2] if known[2] > 0 else math.inf
     if not 0 < growth < 2:
         return math.inf, math.inf
     factor = 3 * max(1.0, growth) ** 2

@@ -35,9 +35,12 @@ Array = np.ndarray
 
 
 class Workspace:
-    """The arrays a kernel fills at one linearisation: field and derivatives at the stages, factors, node relations."""
+    """The arrays a kernel fills at one linearisation: field and derivatives at the stages, factors, node relations.
 
-    __slots__ = ("F", "Fp", "J", "LU", "M", "T", "Z", "dT", "pivots")
+    Where a Newton solve has left it (`complete`), the spectral matrix and the facts of kernels/condensation_newton.py.
+    """
+
+    __slots__ = ("F", "Fp", "J", "LU", "M", "T", "Z", "complete", "dT", "facts", "pivots", "spectral")
 
     def __init__(self, mesh: OrbitMesh, m: int, kept: int) -> None:
         count, N, n = mesh.intervals * mesh.degree, mesh.intervals, mesh.n
@@ -46,6 +49,7 @@ class Workspace:
         self.T, self.dT = np.zeros(1), np.zeros(m)
         self.LU, self.pivots = np.empty((N, size, size)), np.empty((N, size), np.int64)
         self.Z, self.M = np.empty((N, mesh.degree * n, n)), np.empty((N, n, n))
+        self.spectral, self.facts, self.complete = np.empty((n, n)), np.empty(2), False
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +192,7 @@ class CollocationLinearisation:
     @cached_property
     def spectral(self) -> Array:
         """M = D^-1 S^-1 Phi D."""
-        return self.problem.spectral_of(self.work.M)
+        return self.work.spectral if self.work.complete else self.problem.spectral_of(self.work.M)
 
     def _variation(self, start: Array, tau: float, free: int, amount: float) -> tuple[Array, Array]:
         """Nodes (N + 1, n), stages (N, mn) of the variation with dx(0) = start, dT = tau, dp_free = amount."""
