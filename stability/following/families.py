@@ -181,12 +181,17 @@ class _Search:
         return solutions
 
     def images(self, solution: Any) -> list[Any]:
-        """A solution and its images."""
+        """A solution and those images of it that are other solutions."""
         if not callable(solution):
-            moved = [s.matrix @ solution.x for s in self.mirrors]
-            return [solution, *(dataclasses.replace(solution, x=x) for x in moved)]
-        T = solution.period / _turns(self.problem)
-        return [solution, *(_Image(solution, s, s.shift * T) for s in self.mirrors)]
+            moved: list[Any] = [dataclasses.replace(solution, x=s.matrix @ solution.x) for s in self.mirrors]
+        else:
+            T = solution.period / _turns(self.problem)
+            moved = [_Image(solution, s, s.shift * T) for s in self.mirrors]
+        distinct = [solution]
+        for image in moved:
+            if all(_distance(self.problem, image, other) > _SAME for other in distinct):
+                distinct.append(image)
+        return distinct
 
     def is_new(self, value: float, start: Any, found: list[Branch]) -> bool:
         params = self.params_at(value)

@@ -24,6 +24,8 @@ from .storage import register, write
 
 __all__ = ["SpecialPoint"]
 
+_RESONANT = 0.01
+_OF_HALF = (Kind.R1, Kind.R1, Kind.R3, Kind.R2)  # powers 1 to 4 of a half-period map, as the whole period shows them
 _SOLUTIONS: dict[str, Any] = {"fixed-point": FixedPoint, "periodic-orbit": PeriodicOrbit}
 
 
@@ -107,6 +109,21 @@ class SpecialPoint:
         return bool(self.breaking)
 
     @property
+    def resonance(self) -> Kind | None:
+        """The strong resonance that a Neimark-Sacker point is close to: exp(i k theta) within 0.01 of 1, k <= 4.
+
+        On half of a period the angle is that of the half-period map: a pair at +-i is a double -1 of the whole period
+        and named so, 1:2 (a doubling, which a symmetric orbit has in no other way), a double -1 of the half a 1:1.
+        """
+        if self.kind is not Kind.NEIMARK_SACKER:
+            return None
+        upper = [v for v in self.critical_values.tolist() if v.imag >= 0]
+        nearest = min(upper, key=lambda v: abs(abs(v) - 1), default=0j)
+        names = (Kind.R1, Kind.R2, Kind.R3, Kind.R4) if self.half_multipliers is None else _OF_HALF
+        close = [name for k, name in enumerate(names, 1) if abs((nearest / (abs(nearest) or 1.0)) ** k - 1) < _RESONANT]
+        return close[0] if close else None
+
+    @property
     def params_vector(self) -> NDArray[np.float64]:
         """(m,) parameter values in the problem's order."""
         return np.array(list(self.params.values()))
@@ -165,6 +182,7 @@ class SpecialPoint:
     def __repr__(self) -> str:
         named = f" '{self.name}'" if self.name else ""
         words = ([str(self.criticality)] if self.criticality else []) + ["symmetry breaking"] * self.symmetry_breaking
+        words += [f"near {self.resonance}"] if self.resonance else []
         tail = f" | {', '.join(words)}" if words else ""
         return f"{self.label} {self.kind}{named} at {self.free} = {self.params[self.free]:.10g}{tail}"
 
