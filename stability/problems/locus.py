@@ -289,21 +289,35 @@ class Locus:
         return found.u if found.converged else x
 
     def adapt(self, u: Array, params: Array, tangent: Tangent) -> tuple[Locus, Array, Tangent] | None:
-        """The inner problem's better mesh or scales, and a scale that follows lambda_2."""
-        x, second, extra = self.parts(u)
-        t, t_second, t_extra = self.parts(tangent.u)
+        """The inner problem's better mesh or scales, and a scale that follows lambda_2.
+
+        A mesh that breaks the symmetry which keeps a branch point alive is not taken: scales only, then.
+        """
+        x, _, _ = self.parts(u)
         params = self.completed(u, params)
-        better = None
-        if self.kind is not Kind.BRANCH_POINT:
-            if self.kind is Kind.FOLD:
-                x = self._settled(u, params)
-            better = self.inner.adapt(x, params, Tangent(t, tangent.parameter, tangent.weight))
-        scale = self.scale
-        if abs(second) > 2 * scale:
-            scale = 2 * abs(second)
-        if better is None and scale == self.scale:
-            return None
-        inner, x, t = (self.inner, x, t) if better is None else (better[0], better[1], better[2].u)
+        if self.kind is Kind.FOLD:
+            x = self._settled(u, params)
+        t = self.parts(tangent.u)[0]
+        better = self.inner.adapt(x, params, Tangent(t, tangent.parameter, tangent.weight))
+        if better is None:
+            moved = self._moved(self.inner, x, t, u, tangent)
+            return None if moved[0].scale == self.scale else moved
+        moved = self._moved(better[0], better[1], better[2].u, u, tangent)
+        if self.kind is Kind.BRANCH_POINT and better[1].size == x.size and np.array_equal(better[1], x):
+            return moved  # other scales
+        if self.kind is Kind.BRANCH_POINT:
+            again = moved[0].correct(moved[1], params, self.along, moved[2], 0.0, 1e-8)
+            if not again.converged:
+                if not hasattr(self.inner, "rescaled"):
+                    return None
+                scaled = self.inner.rescaled(better[0].scales, better[0].period_scale)
+                return self._moved(scaled, x, t, u, tangent)
+        return moved
+
+    def _moved(self, inner: Any, x: Array, t: Array, u: Array, tangent: Tangent) -> tuple[Locus, Array, Tangent]:
+        """This curve over another inner problem, with unknowns x and direction t there."""
+        (_, second, extra), (_, t_second, t_extra) = self.parts(u), self.parts(tangent.u)
+        scale = 2 * abs(second) if abs(second) > 2 * self.scale else self.scale
         new = dataclasses.replace(self, inner=inner, scale=scale, born=None, _memo={})
         direction = np.concatenate([t, [t_second], t_extra])
         length = math.sqrt(float(new.weights @ direction**2) + (tangent.parameter * tangent.weight) ** 2)
