@@ -51,17 +51,21 @@ def _without_twins(entries: list[Entry]) -> list[Entry]:
 
     A mesh that is not the same in both halves of a symmetric orbit unfolds the pitchfork by its error.
     """
-    marked = [k for k, e in enumerate(entries) if e.found is not None]
-    drop = set()
-    for i, j in pairwise(marked):
-        kinds = {entries[i].found.kind: i, entries[j].found.kind: j}  # type: ignore[union-attr]
-        p, q = entries[i].point, entries[j].point
-        gap, apart = abs(p.parameter - q.parameter) * p.tangent.weight, abs(p.s - q.s)
-        if set(kinds) != {Kind.FOLD, Kind.BRANCH_POINT} or not (gap < _TWINS[0] and apart < _TWINS[1]):
-            continue
-        if (gap < 1e-8 and apart < 2e-4) or gap < 3 * max(r.problem.error(r.u, r.params) for r in (p, q)):
-            drop.add(kinds[Kind.FOLD])
+    folds, crossings = (
+        [k for k, e in enumerate(entries) if e.found is not None and e.found.kind is kind]
+        for kind in (Kind.FOLD, Kind.BRANCH_POINT)
+    )
+    drop = {i for i in folds if any(_twins(entries[i].point, entries[j].point) for j in crossings)}
     return [e for k, e in enumerate(entries) if k not in drop]
+
+
+def _twins(fold: Point, crossing: Point) -> bool:
+    gap, apart = abs(fold.parameter - crossing.parameter) * fold.tangent.weight, abs(fold.s - crossing.s)
+    if not (gap < _TWINS[0] and apart < _TWINS[1]):
+        return False
+    if gap < 1e-8 and apart < 2e-4:
+        return True
+    return gap < 3 * max(r.problem.error(r.u, r.params) for r in (fold, crossing))
 
 
 def _same(p: Point, q: Point) -> bool:

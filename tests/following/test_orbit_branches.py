@@ -165,3 +165,30 @@ def test_undamped_resonance_is_climbed_as_far_as_the_digits_go() -> None:
     path = st.simulate(system, (0.0, last.period), x0=last(0.0), rtol=1e-12, atol=1e-12, Omega=3.0)
     size = np.array([last.max["u"], last.max["u_dot"]])
     assert np.abs((path(last.period) - last(0.0)) / size).max() < 100 * branch.error[-1] < 1e-2
+
+
+def test_far_end_of_a_family_is_named_after_its_parent() -> None:
+    """The doubled family of the pendulum ends at the second period doubling of its parent, cycles at a Hopf point."""
+    system = st.models.autoparametric_pendulum(
+        length_ratio=10.0, mass_ratio_total=0.2, Omega0=0.5, xi1=0.02, xi2=0.01, base_term=False
+    )
+    semi = st.continuation(st.Collocation(system), "Omega", (0.5, 1.5))
+    swing = st.continuation(st.switch(semi["PD1"]), "Omega", (0.5, 1.5))
+    end = swing["parent's PD"]
+    assert end is swing.special[-1] and end.params["Omega"] == pytest.approx(semi["PD2"].params["Omega"], abs=1e-8)
+    assert [p.name for p in swing.special[:-1]] == [""] * (len(swing.special) - 1)
+
+
+@pytest.mark.parametrize("problem", ["balance", "rough mesh"])
+def test_a_pitchfork_met_on_its_own_side_branch_is_one_point(problem: str) -> None:
+    """From one symmetry-breaking point to the other and back: two branch points, no folds beside them."""
+    system = st.models.duffing_textbook(delta=0.1, alpha=1, beta=1, gamma=5)
+    balance = st.HarmonicBalance(system, harmonics=15)
+    solver = balance if problem == "balance" else st.Collocation(system, accuracy=1e-7)
+    symmetric = st.continuation(solver, "omega", (0.85, 1.35))
+    breaking = [p.params["omega"] for p in symmetric.of_kind(st.Kind.BRANCH_POINT)]
+    for born in symmetric.of_kind(st.Kind.BRANCH_POINT):
+        loop = st.continuation(st.switch(born), "omega", (0.85, 1.35))
+        crossings = sorted(p.params["omega"] for p in loop.of_kind(st.Kind.BRANCH_POINT))
+        np.testing.assert_allclose(crossings, sorted(breaking), atol=1e-6)
+        assert len(loop.of_kind(st.Kind.FOLD)) == 4 and not loop.of_kind(st.Kind.UNEXPLAINED)
