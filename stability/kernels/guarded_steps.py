@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from stability.kernels.addresses import call_field
-from stability.kernels.compiled import B1, R1, R3, kernel
+from stability.kernels.caching import kernel
 
 __all__ = ["scan", "values"]
 
@@ -24,13 +24,12 @@ _GOLDEN = 0.6180339887498949
 
 
 @kernel
-def values(guards: int, P: R1, x: R1, t: float, size: int) -> R1:
+def values(guards, P, x, t, size):  # type: ignore[no-untyped-def]
     """Values (size,) of all guards at (x, t)."""
     X, F = np.zeros((1, size)), np.zeros((1, size))
     none = np.empty((1, 1, 1))
     n = x.shape[0]
-    for a in range(n):
-        X[0, a] = x[a]
+    X[0, :n] = x
     X[0, n] = t
     call_field(guards, 1, np.zeros(1), X, P, 0, F, none, none)
     return F[0].copy()
@@ -140,9 +139,7 @@ def _bisected(guards, P, times, coefficients, j, k, sign, low, high, X, F, none,
 
 
 @kernel
-def scan(
-    guards: int, P: R1, times: R1, coefficients: R3, size: int, count: int, signs: R1, active: B1, fresh: B1,
-) -> tuple[int, float, int, float]:  # fmt: skip
+def scan(guards, P, times, coefficients, size, count, signs, active, fresh):  # type: ignore[no-untyped-def]
     """(step, theta, guard, slope) of the first event in steps (K + 1,) (K, 8, n); guard -1: none; theta -1: not left.
 
     signs (count,), active and fresh (count,) bool. slope: d w/dt there.

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from stability.kernels.addresses import call_field
-from stability.kernels.compiled import I1, R1, R2, R3, kernel
+from stability.kernels.caching import kernel
 from stability.kernels.dop853_coefficients import E3 as _E3
 from stability.kernels.dop853_coefficients import E5 as _E5
 from stability.kernels.dop853_coefficients import A as _A
@@ -23,9 +23,9 @@ from stability.kernels.dop853_coefficients import B as _B
 from stability.kernels.dop853_coefficients import C as _C
 from stability.kernels.dop853_coefficients import D as _D
 
-__all__ = ["DONE", "NOT_FINITE", "STEP_TOO_SMALL", "TOO_MANY_STEPS", "advance", "integrate", "interpolate"]
+__all__ = ["DONE", "NOT_FINITE", "STEP_TOO_SMALL", "TOO_MANY_STEPS", "integrate", "interpolate"]
 
-DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, NOT_FINITE, NO_ROOM = 0, 1, 2, 3, 4
+DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, NOT_FINITE = 0, 1, 2, 3
 
 
 @kernel(inline=True)
@@ -56,8 +56,7 @@ def _error(K, h, z, new, rtol, atol, n, P, which):  # type: ignore[no-untyped-de
     """
     worst = 0.0
     columns = z.shape[1]
-    for part in range(2):
-        first, last = (0, 1) if part == 0 else (1, columns)
+    for first, last in ((0, 1), (1, columns)):
         five, three, count = 0.0, 0.0, 0
         for k in range(first, last):
             size = 0.0
@@ -123,29 +122,28 @@ def _doubled(times, coefficients, steps):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def advance(
-    field: int, P: R1, sigma: float, phase0: float, rate: float, low: float, high: float, s: float, end: float, z: R2,
-    which: I1, sigma_p: R1, rtol: float, atol: R1, h: float, max_steps: int, dense: int, steps: int, times: R1,
-    coefficients: R3,
-) -> tuple[int, float, float, int]:  # fmt: skip
-    """Advance z (n, 1 + k) in place from s to `end` > s: (status, s reached, last h, steps taken).
+def integrate(field, P, sigma, phase0, rate, s, end, z, which, sigma_p, rtol, atol, h, inside, max_steps, dense):  # type: ignore[no-untyped-def]
+    """Advance z (n, 1 + k) in place from s to `end` > s.
 
-    The field is never evaluated beyond low and high. dense = 1 keeps the steps from number `steps` on in times and
-    coefficients as `integrate` describes, and ends with NO_ROOM when these are full.
+    which (k,) int: parameter index of a variation, -1 for none; sigma_p (k,). h: first step, 0 for an automatic one.
+    The field is never evaluated closer than `inside` to the two ends: they may be jumps of the field in time.
+    dense = 1 keeps the steps. Returns (status, s reached, last h, steps, times (steps + 1,), coefficients
+    (steps, 8, n)): on a step x(s + theta h) is built from the eight coefficients by `interpolate`.
     """
     n, columns = z.shape
     K = np.zeros((16, n, columns))
     F, J, Fp = np.empty((1, n)), np.empty((1, n, n)), np.empty((1, n, P.shape[0]))
     x, phase, work, new = np.empty((1, n)), np.empty(1), np.empty((n, columns)), np.empty((n, columns))
-    rejected = False
+    low, high = s + inside, end - inside
+    room = 64 if dense == 1 else 1
+    times, coefficients = np.empty(room + 1), np.empty((room, 8, n))
+    times[0] = s
+    steps, rejected = 0, False
     _slope(field, P, sigma, phase0, rate, low, high, s, z, n, which, sigma_p, F, J, Fp, x, phase, K[0])
     if h <= 0.0:
         h = _first_step(z, K[0], rtol, atol, end - s)
     status = TOO_MANY_STEPS
     for _ in range(max_steps):
-        if dense == 1 and steps == coefficients.shape[0]:
-            status = NO_ROOM
-            break
         h = min(h, end - s)
         if end - s - h < 1e-3 * h:
             h = end - s
@@ -165,6 +163,8 @@ def advance(
         at = s + h
         _slope(field, P, sigma, phase0, rate, low, high, at, new, n, which, sigma_p, F, J, Fp, x, phase, K[12])
         if dense == 1:
+            if steps == coefficients.shape[0]:
+                times, coefficients = _doubled(times, coefficients, steps)
             for i in range(13, 16):
                 _stage(_A[i], i, h, z, K, work)
                 at = s + _C[i] * h
@@ -183,33 +183,6 @@ def advance(
             break
         h *= min(1.0 if rejected else 6.0, max(0.333, 0.9 * error ** (-0.125) if error > 0.0 else 6.0))
         rejected = False
-    return status, s, h, steps
-
-
-@kernel
-def integrate(
-    field: int, P: R1, sigma: float, phase0: float, rate: float, s: float, end: float, z: R2, which: I1, sigma_p: R1,
-    rtol: float, atol: R1, h: float, inside: float, max_steps: int, dense: int,
-) -> tuple[int, float, float, int, R1, R3]:  # fmt: skip
-    """Advance z (n, 1 + k) in place from s to `end` > s.
-
-    which (k,) int: parameter index of a variation, -1 for none; sigma_p (k,). h: first step, 0 for an automatic one.
-    The field is never evaluated closer than `inside` to the two ends: they may be jumps of the field in time.
-    dense = 1 keeps the steps. Returns (status, s reached, last h, steps, times (steps + 1,), coefficients
-    (steps, 8, n)): on a step x(s + theta h) is built from the eight coefficients by `interpolate`.
-    """
-    n, low, high = z.shape[0], s + inside, end - inside
-    room = 64 if dense == 1 else 1
-    times, coefficients = np.empty(room + 1), np.empty((room, 8, n))
-    times[0] = s
-    status, steps = NO_ROOM, 0
-    while status == NO_ROOM:
-        if steps == coefficients.shape[0]:
-            times, coefficients = _doubled(times, coefficients, steps)
-        status, s, h, steps = advance(
-            field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps - steps,
-            dense, steps, times, coefficients,
-        )  # fmt: skip
     return status, s, h, steps, times[: steps * dense + 1], coefficients[: steps * dense]
 
 
@@ -230,7 +203,7 @@ def _keep(h, z, new, K, coefficients, q):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def interpolate(times: R1, coefficients: R3, at: R1, out: R2) -> None:
+def interpolate(times, coefficients, at, out):  # type: ignore[no-untyped-def]
     """Dense output at ascending or unordered s (M,): fills out (M, n); s outside the span is extrapolated."""
     steps, _, n = coefficients.shape
     j = 0

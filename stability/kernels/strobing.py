@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from stability.kernels.compiled import B1, I1, R1, R2, kernel
-from stability.kernels.runge_kutta import DONE, advance
+from stability.kernels.caching import kernel
+from stability.kernels.runge_kutta import DONE, integrate
 
 __all__ = ["ESCAPED", "UNDECIDED", "assign"]
 
@@ -36,10 +36,7 @@ def _near(z, points, owners, scale, wraps, tolerance):  # type: ignore[no-untype
 
 
 @kernel
-def assign(
-    field: int, P: R1, rate: float, cuts: R1, inside: float, X: R2, periods: int, points: R2, owners: I1, scale: R1,
-    wraps: B1, tolerance: float, rtol: float, atol: R1, labels: I1,
-) -> None:  # fmt: skip
+def assign(field, P, rate, cuts, inside, X, periods, points, owners, scale, wraps, tolerance, rtol, atol, labels):  # type: ignore[no-untyped-def]
     """Follow every row of X (N, n), in place, for at most `periods` periods; labels (N,) int are filled.
 
     cuts (C + 1,): edges of the smooth pieces of one period, from 0 to T; points (K, n) and owners (K,): stroboscopic
@@ -47,19 +44,17 @@ def assign(
     """
     count, n = X.shape
     which, sigma = np.zeros(0, np.int64), np.zeros(0)
-    z, times, steps = np.empty((n, 1)), np.empty(1), np.empty((1, 8, n))
+    z = np.empty((n, 1))
     for i in range(count):
-        for a in range(n):
-            z[a, 0] = X[i, a]
+        z[:, 0] = X[i]
         labels[i] = UNDECIDED
         h, row, last = 0.0, 0, UNDECIDED
         for _ in range(periods):
             status = DONE
             for c in range(cuts.shape[0] - 1):
-                status, _, h, _ = advance(
-                    field, P, 1.0, 0.0, rate, cuts[c] + inside, cuts[c + 1] - inside, cuts[c], cuts[c + 1], z, which,
-                    sigma, rtol, atol, h, 100000, 0, 0, times, steps,
-                )  # fmt: skip
+                status, _, h, _, _, _ = integrate(
+                    field, P, 1.0, 0.0, rate, cuts[c], cuts[c + 1], z, which, sigma, rtol, atol, h, inside, 100000, 0
+                )
                 if status != DONE:
                     break
             if status != DONE:
@@ -71,5 +66,4 @@ def assign(
             if now != UNDECIDED and row >= _IN_A_ROW:
                 labels[i] = now
                 break
-        for a in range(n):
-            X[i, a] = z[a, 0]
+        X[i] = z[:, 0]
