@@ -57,6 +57,7 @@ _EXPORTS: dict[str, str] = {
     "LyapunovSpectrum": "simulation.chaos",
     "Ensemble": "simulation.simulating",
     "Trajectory": "results.trajectory",
+    "LineSpectrum": "results.line_spectrum",
     "sweep": "simulation.sweeping",
     "Sweep": "results.sweep",
     "Status": "words",

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,9 @@ from ..kernels import piecewise
 from ..kernels.settling import SETTLED, transient_left
 from .solutions import frozen
 from .storage import register, write
+
+if TYPE_CHECKING:
+    from .line_spectrum import LineSpectrum
 
 __all__ = ["Ending", "Happening", "Spectrum", "Trajectory"]
 
@@ -299,6 +302,19 @@ class Trajectory:
         window = np.hanning(count + 1)[:-1]
         heights = np.abs(np.fft.rfft((values - values.mean()) * window)) * 2 / window.sum()
         return Spectrum(np.asarray(np.fft.rfftfreq(count, (t1 - t0) / count), float), np.asarray(heights, float))
+
+    def frequencies(self, name: str | None = None, *, periods: float | None = None, most: int = 20) -> LineSpectrum:
+        """Base frequencies and combination lines of a periodic or quasi-periodic motion, with an error estimate.
+
+        Parameters
+        ----------
+        name : state or output, default the first state
+        periods : only the last so many forcing periods (transients broaden the lines)
+        most : number of lines
+        """
+        from .line_spectrum import line_spectrum
+
+        return line_spectrum(self if periods is None else self.last(periods), name or self.states[0], most)
 
     @cached_property
     def transient(self) -> tuple[float, int]:
