@@ -329,7 +329,9 @@ class Locus:
         x, second, extra = self.parts(u)
         own = {self.free: second}
         if self.kind is Kind.NEIMARK_SACKER:
-            own["torus_angle"] = math.acos(min(1.0, max(-1.0, float(extra[0]))))
+            angle = math.acos(min(1.0, max(-1.0, float(extra[0]))))
+            halved = getattr(self.inner, "halved", False)  # then theta of the half-period map
+            own["torus_angle"] = min(2 * angle, 2 * (math.pi - angle)) if halved else angle
         if self.kind is Kind.HOPF:
             own["hopf_frequency"] = math.sqrt(max(0.0, float(extra[0])))
         return {**own, **self.inner.measures(x, self.completed(u, params))}

@@ -10,6 +10,7 @@ the product pi over pairs of the values that are not critical, lambda_i + lambda
                       first Lyapunov coefficient -> generalized Hopf
     period doubling   chi'(-1) -> resonance 1:2;  chi(1) -> fold-flip;  cubic coefficient -> generalized period doubling
     Neimark-Sacker    c - 1, c + 1, c + 1/2, c -> resonances 1:1, 1:2, 1:3, 1:4 (c = cos theta);  d -> Chenciner
+    on half a period  chi'(-1), c^2 - 1, c + 1/2, c -> resonances 1:1, 1:1, 1:3, 1:2 of the whole one
 
 chi' at the critical value is a symmetric function of all values, smooth where two of them meet (each of them alone is
 not). Where the rate of the followed parameter vanishes the curve turns (fold); where both rates do, on a fold curve, it
@@ -81,6 +82,8 @@ def monitors(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
 
 def _by_kind(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
     circle = curve.inner.critical.circle
+    if getattr(curve.inner, "halved", False):
+        return _on_half(curve.kind)
     if curve.kind is Kind.FOLD and not circle:
         return ((Kind.BOGDANOV_TAKENS, _slope(0.0)), (Kind.ZERO_HOPF, _pairs(circle)))
     if curve.kind is Kind.FOLD:
@@ -98,6 +101,21 @@ def _by_kind(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
         resonances = ((Kind.R1, 1.0), (Kind.R2, -1.0), (Kind.R3, -0.5), (Kind.R4, 0.0))
         return (*((kind, _extra(c)) for kind, c in resonances), (Kind.CHENCINER, _coefficient))
     return ()
+
+
+def _on_half(kind: Kind) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
+    """Strong resonances of a half-period map N by the names of the whole period, N^2 (see `orbit_symmetry`).
+
+    A double -1 of N, on a curve of symmetry-breaking points, is a double +1; a pair at +-i a double -1.
+    """
+    if kind is Kind.NEIMARK_SACKER:
+        return ((Kind.R1, _both_ends), (Kind.R2, _extra(0.0)), (Kind.R3, _extra(-0.5)), (Kind.CHENCINER, _coefficient))
+    double = {Kind.FOLD: 1.0, Kind.PERIOD_DOUBLING: -1.0}
+    return ((Kind.R1, _slope(double[kind])),) if kind in double else ()
+
+
+def _both_ends(point: Any) -> float:
+    return float(point.problem.parts(point.u)[2][0] ** 2 - 1)
 
 
 def confirmed(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:

@@ -169,6 +169,26 @@ def test_pairs_of_the_half_period_map(frequency, resonance):
     assert ("near" in repr(torus)) == (resonance is not None)
 
 
+def test_curve_of_torus_points_of_the_half_period_map():
+    """At a = 0 for every frequency W; angle of the whole period W T, folded; a double -1 where W = 1/2."""
+    u, w = sp.Function("u")(t), sp.Function("w")(t)
+    a, W = sp.symbols("a W", real=True)
+    system = st.System.from_equations(
+        {
+            u.diff(t, 2): -sp.Rational(1, 5) * u.diff(t) - 2 * u + sp.cos(Omega * t),
+            w.diff(t, 2): a * w.diff(t) - W**2 * w - w.diff(t) ** 3,
+        },
+        coordinates=[u, w], parameters={"Omega": 1.0, "a": -0.1, "W": 0.4}, period=2 * sp.pi / Omega,
+    )  # fmt: skip
+    torus = st.continuation(st.Collocation(system, symmetry={"u": "-u", "w": "-w"}), "a", (-0.1, 0.1))["NS1"]
+    curve = st.continuation(st.locus(torus, free="a", along="W"), "W", (0.3, 0.7))
+    assert np.abs(curve.columns["a"]).max() < 1e-9
+    turns = 2 * np.pi * curve.columns["W"]
+    np.testing.assert_allclose(curve.columns["torus_angle"], np.minimum(turns, 2 * np.pi - turns), atol=1e-7)
+    places = {str(p.kind): p.params["W"] for p in curve.special if str(p.kind).startswith("resonance")}
+    assert places == {"resonance 1:2": pytest.approx(0.5, abs=1e-7), "resonance 1:3": pytest.approx(1 / 3, abs=1e-7)}
+
+
 # ---------------------------------------------------------------------- images
 def test_the_image_of_a_discrete_solution_is_one():
     """An asymmetric orbit of Duffing's oscillator on a mesh with a knot at the middle: the image's residual is rounding."""
