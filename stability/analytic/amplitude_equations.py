@@ -16,6 +16,7 @@ from resonance) and N = [g_1]_K/(2 i M),
     A' = Z + (V - dN/dA) Z,     Z = R/(2 i M),     M = W - delta/2 = (3 W^2 + omega^2)/(4 W),
 
 V the effect of A' in the velocities: its equilibria R_1 + R_2 = 0 are the balance with the other harmonics eliminated.
+Of modes, which may be far from their resonance, A' = (R_1 + R_2)/(2 i W): the same equilibria, rates to first order.
 
 `expanded` is the textbook's method of multiple scales: everything is expanded about W_i = omega_i + sigma_i with
 sigma_i of order eps, and powers beyond eps^2 are dropped. References: Nayfeh and Mook (1979), sections 2.3, 4.1;
@@ -66,14 +67,15 @@ def _over_2iW(amplitudes: Amplitudes, i: int, terms: Terms) -> Terms:
 
 
 def _corrections(amplitudes: Amplitudes) -> Corrections:
-    """The harmonics of x_i1."""
+    """The harmonics of x_i1; of a form that is exact with omega_i^2 - k^2 nu^2 below."""
     found: Corrections = []
-    for i, terms in enumerate(amplitudes.form.orders[0]):
-        K = amplitudes.form.multiples[i]
+    form = amplitudes.form
+    for i, terms in enumerate(form.orders[0]):
+        K = form.multiples[i]
         rows: dict[int, Terms] = {}
         for term in terms:
             if term.rough:
-                shown = readable(term.expression(amplitudes.form.states))
+                shown = readable(term.expression(form.states))
                 raise EquationError(
                     f"the term {shown} has infinitely many harmonics: averaging takes it to order 1 "
                     "only; use order=1, or HarmonicBalance(system)"
@@ -81,7 +83,10 @@ def _corrections(amplitudes: Amplitudes) -> Corrections:
             coefficient, series = amplitudes.harmonics(term)
             for k, element in series.items():
                 if abs(k) != K and element:
-                    factor = sp.Rational(K**2, K**2 - k**2) / amplitudes.W[i] ** 2
+                    if form.exact:
+                        factor = 1 / (form.stiffness[i] - sp.Rational(k**2, K**2) * amplitudes.W[i] ** 2)
+                    else:
+                        factor = sp.Rational(K**2, K**2 - k**2) / amplitudes.W[i] ** 2
                     add(rows.setdefault(k, {}), coefficient * factor, element)
         found.append({k: row for k, row in rows.items() if row})
     return found
@@ -139,6 +144,9 @@ def averaged(form: StandardForm) -> AmplitudeEquations:
     none: list[Terms] = [{} for _ in range(n)]
     corrections: Corrections = _corrections(amplitudes)
     residual = [added(r, s) for r, s in zip(residual, _second(amplitudes, corrections, none))]
+    if form.exact:
+        motion = [_over_2iW(amplitudes, i, r) for i, r in enumerate(residual)]
+        return AmplitudeEquations(amplitudes, tuple(motion), tuple(corrections), tuple(residual), values)
     means = [sp.Dummy(f"M{i}", positive=True) for i in range(n)]
     Z = [scaled(r, 1 / (2 * M), -1j) for r, M in zip(residual, means)]
     N = [scaled(g, 1 / (2 * M), -1j) for g, M in zip(forces, means)]

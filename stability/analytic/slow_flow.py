@@ -17,9 +17,19 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from ..errors import EquationError, InputError
+from ..systems.equations import symbol
 from .amplitude_equations import AmplitudeEquations, averaged, expanded
+from .modal_coordinates import Modes, coupling, modes_of, physical
 from .slow_systems import slow_system
-from .standard_form import Resonance, Small, StandardForm, check_oscillators, standard_form
+from .standard_form import (
+    Resonance,
+    Small,
+    StandardForm,
+    check_oscillators,
+    graded_rows,
+    scaling_orders,
+    standard_form,
+)
 
 if TYPE_CHECKING:
     from ..systems.system import System
@@ -55,6 +65,8 @@ def averaging(
         Excitation : response = p : q, for the slowest coordinate: ``(2, 1)`` is the principal parametric resonance, the
         response at half the excitation frequency; the others follow at the nearest integer multiples of it. A mapping
         gives a pair for each coordinate. None takes the first of 1:1, 2:1, 3:1, 1:2, 1:3 at which the forcing acts.
+        Coordinates that are coupled at order 0 are averaged as modes ``mode1, mode2, ...`` (`modal_coordinates`), which
+        all answer at the one ratio, or as a mapping by these names says.
     variables : {"cartesian", "polar"} or None
         Slow states ``<q>_cos, <q>_sin``, or ``<q>_amplitude, <q>_phase`` (singular at zero). None: cartesian; for an
         autonomous oscillator polar, where the phase is cyclic: state ``<q>_amplitude`` and output ``frequency``.
@@ -161,11 +173,51 @@ def _slow_flow(
     if free:
         _check_free(system, resonance)
         return slow_system(method(standard_form(system, order, (1, 1), small)), variables != "cartesian", label, order)
+    modes = _modes(system, small) if method is averaged else None
+    if modes is not None:
+        return _modal_flow(modes, label, order, resonance, variables)
+    equations = _resonant(system, method, label, order, resonance, small)
+    return slow_system(equations, variables == "polar", label, order)
+
+
+def _modes(system: System, small: Small) -> Modes | None:
+    """Modal coordinates of a system whose coordinates are coupled at order 0; None for all others."""
+    scaled = scaling_orders(system, small)
+    if len(system.coordinates) < 2 or len({scaled.get(symbol(c), 0) for c in system.coordinates}) > 1:
+        return None
+    K = coupling(system, graded_rows(system, scaled, 1)[0])
+    return None if K is None else modes_of(system, K, scaled)
+
+
+def _modal_flow(modes: Modes, label: str, order: int, resonance: Resonance, variables: str | None) -> System:
+    """All modes answer at one frequency, or each as a mapping by its name says."""
+    tried: list[Resonance] = [resonance]
+    if not isinstance(resonance, Mapping):
+        tried = [dict.fromkeys(modes.names, pair) for pair in (_USUAL if resonance is None else (resonance,))]
+    for pairs in tried:
+        equations = averaged(standard_form(modes.system, order, pairs, None, exact=True))
+        if _acts(equations):
+            break
+    else:
+        raise InputError(
+            f"the forcing of '{modes.original.name}' has no effect to order {order} at resonance = "
+            f"{'any of the usual ones' if resonance is None else resonance}; give another (p, q), or one for each of "
+            f"{', '.join(modes.names)}"
+        )
+    slow = slow_system(equations, variables == "polar", label, order)
+    return physical(slow, modes, len(set(equations.amplitudes.form.multiples)) == 1)
+
+
+def _resonant(
+    system: System, method: Callable[[StandardForm], AmplitudeEquations], label: str, order: int, resonance: Resonance,
+    small: Small,
+) -> AmplitudeEquations:  # fmt: skip
+    """The amplitude equations at the resonance asked for, or at the first at which the forcing acts."""
     if resonance is not None:
         equations = method(standard_form(system, order, resonance, small))
         if not _acts(equations):
             raise _no_resonance(system, order, resonance, method, small)
-        return slow_system(equations, variables == "polar", label, order)
+        return equations
     for level in range(1, order + 1):
         for pair in _USUAL:
             try:
@@ -175,8 +227,7 @@ def _slow_flow(
                     raise
                 continue
             if acts:
-                equations = method(standard_form(system, order, pair, small))
-                return slow_system(equations, variables == "polar", label, order)
+                return method(standard_form(system, order, pair, small))
     raise InputError(
         f"the forcing of '{system.name}' has no effect to order {order} at any of "
         f"{', '.join(f'{p}:{q}' for p, q in _USUAL)}; give resonance=(p, q), or order=2"

@@ -31,6 +31,7 @@ class _Variables:
         self.equations, self.polar = equations, polar
         self.amplitudes = equations.amplitudes
         form = self.amplitudes.form
+        self.decimal = form.exact
         names = form.system.coordinates
         ends = ("amplitude", "phase") if polar else ("cos", "sin")
         self.pairs = [tuple(symbol(f"{c}_{end}") for end in ends) for c in names]
@@ -69,7 +70,8 @@ class _Variables:
         out = []
         for part in ("x", "y"):
             piece = exact.from_dict({m: getattr(c, part) for m, c in total.terms() if getattr(c, part)})
-            out.append(sp.factor(piece.as_expr()).xreplace(self.back) if piece else sp.S.Zero)
+            found = piece.as_expr() if piece else sp.S.Zero
+            out.append((found.evalf() if self.decimal else sp.factor(found)).xreplace(self.back))
         return out[0], out[1]
 
     def _polar(self, element: Any, turn: int | None) -> tuple[sp.Expr, sp.Expr]:
@@ -154,7 +156,7 @@ def _reconstruction(
             position += 2 * (real * cosine - imaginary * sine)
             speed = outputs["frequency"] if free else rate
             velocity += 2 * sp.Rational(k, K) * speed * (-real * sine - imaginary * cosine)
-        if len(form.orders) > 1 and not free:
+        if len(form.orders) > 1 and not free and not form.exact:  # zero in a steady state
             slow, turning = variables.parts(equations.motion[i], i)
             if variables.polar:
                 psi = variables.pairs[i][1]

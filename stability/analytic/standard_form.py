@@ -49,6 +49,7 @@ class StandardForm:
     orders: tuple[tuple[tuple[Monomial, ...], ...], ...]
     hard: tuple[Mapping[int, tuple[sp.Expr, sp.Expr]], ...]
     ratio: tuple[int, int]
+    exact: bool = False  # other harmonics by omega_i^2 itself, for coordinates that are not near their resonance
 
     @property
     def states(self) -> tuple[sp.Symbol, ...]:
@@ -142,7 +143,9 @@ def natural_frequency(form: StandardForm, stiffness: sp.Expr) -> sp.Expr:
     return root(form.system, stiffness)
 
 
-def standard_form(system: System, order: int, resonance: Resonance, small: Small) -> StandardForm:
+def standard_form(
+    system: System, order: int, resonance: Resonance, small: Small, exact: bool = False
+) -> StandardForm:
     """The standard form of a system up to eps^order.
 
     Raises
@@ -173,13 +176,16 @@ def standard_form(system: System, order: int, resonance: Resonance, small: Small
         rows = []
         for row in found:
             terms = [t for o, ts in row.items() if (level - 1) * step < o <= level * step for t in ts]
+            if exact:  # sums of fractions times parameters: taken apart, like coefficients are few
+                terms = [dataclasses.replace(t, coefficient=c) for t in terms
+                         for c in sp.Add.make_args(sp.expand(t.coefficient))]  # fmt: skip
             rows.append(tuple(dataclasses.replace(t, harmonic=t.harmonic // common * ratio[0]) for t in terms))
         levels.append(tuple(rows))
     hard = [
         _linear_response(system, i, forcing, sp.Rational(ratio[0], common), multiples[i], base, stiffness[i])
         for i, forcing in enumerate(forcings)
     ]
-    return StandardForm(system, base, multiples, tuple(stiffness), tuple(levels), tuple(hard), ratio)
+    return StandardForm(system, base, multiples, tuple(stiffness), tuple(levels), tuple(hard), ratio, exact)
 
 
 def _linear_part(
@@ -201,9 +207,10 @@ def _linear_part(
             linear = sum(term.powers) == 1 and not term.rough and term.harmonic == 0
             if linear and term.powers.index(1) < len(system.coordinates):
                 raise EquationError(
-                    f"the term {shown} couples '{name}' to another coordinate at order {o}: averaging needs modal "
-                    "coordinates, or a coupling parameter with a positive scaling order (small=); or use "
-                    "HarmonicBalance(system)"
+                    f"the term {shown} couples '{name}' to another coordinate at order {o}: `averaging` takes modal "
+                    "coordinates where all coordinates have one scaling order (and the coupling order 0), "
+                    "`multiple_scales` does not; else give a coupling parameter a positive scaling order (small=), or "
+                    "use HarmonicBalance(system)"
                 )
             names = ", ".join(sorted(s.name for s in term.coefficient.free_symbols))
             remedy = f"one of its parameters ({names}) or states" if names else "its states"

@@ -116,7 +116,8 @@ def chain(
         ),
         bounds=dict(Omega=_POSITIVE, mass_ratio_21=(0, float("inf"))),
         outputs=dict(relative=v - u),
-        orders=dict(xi1=1, xi2=1, beta1=1, beta2=1),
+        # as for `duffing`: the base motion is 1, the response at resonance 1/eps
+        orders=dict(xi1=1, xi2=1, beta1=3, beta2=3, gravity=-1 if gravity else 1, u=-1, v=-1),
         name="chain",
         description="two masses in a chain on a moving base",
     )  # fmt: skip
