@@ -96,12 +96,12 @@ class _Interval(click.ParamType):
 SPAN, SHAPE, SETTING, INTERVAL = _Span(), _Shape(), _Setting(), _Interval()
 
 
-def settings(pairs: Sequence[tuple[str, Any]]) -> dict[str, Any]:
+def settings(pairs: Sequence[tuple[str, Any]], option: str = "--set") -> dict[str, Any]:
     """The settings by name; one name given twice is a mistake, not a silent choice."""
     found: dict[str, Any] = {}
     for name, value in pairs:
         if name in found:
-            raise click.BadParameter(f"{name} is set twice", param_hint="'--set'")
+            raise click.BadParameter(f"{name} is set twice", param_hint=f"'{option}'")
         found[name] = value
     return found
 

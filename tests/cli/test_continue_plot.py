@@ -77,7 +77,65 @@ def test_start_of_a_branch(capsys: pytest.CaptureFixture[str]) -> None:
     assert abs(facts["special"][0]["rho"] - 470 / 19) < 1e-8
 
 
+def branches_of(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> list[dict[str, object]]:
+    assert main([*arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)["branches"]  # type: ignore[no-any-return]
+
+
+def test_methods_find_the_same_folds(capsys: pytest.CaptureFixture[str]) -> None:
+    for method in ("harmonic-balance", "shooting"):
+        (facts,) = branches_of([*DUFFING, "--method", method], capsys)
+        places = [point["Omega"] for point in facts["special"] if point["kind"] == "fold"]  # type: ignore[attr-defined]
+        assert np.allclose(places, [1.380933030, 1.088436639], atol=1e-6, rtol=0)
+
+
+def test_steps_and_periods(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A shorter longest step takes more points; an orbit run through twice has the period doubled and the same folds."""
+    plain, fine = (branches_of([*DUFFING, *more], capsys)[0] for more in ([], ["--ds-max", "0.05"]))
+    assert fine["points"] > 2 * plain["points"]  # type: ignore[operator]
+    arguments = [*DUFFING, "--multiple", "2", "-o", "b.npz"]
+    (twice,) = branches_of(arguments, capsys)
+    assert [point["label"] for point in twice["special"]] == ["LP1", "LP2"]  # type: ignore[attr-defined]
+    assert st.load("b.npz").columns["period"][0] == pytest.approx(4 * np.pi / 0.8)
+    (few,) = branches_of([*DUFFING, "--method", "harmonic-balance", "--harmonics", "1"], capsys)
+    assert len(few["special"]) == 2  # type: ignore[arg-type]
+
+
+ROTOR = """name = "rotor"
+coordinates = ["phi"]
+equations = ["phi'' + 0.2*phi' + w**2*A*sin(phi)*cos(w*t) + 0.05*sin(phi) = 0"]
+period = "2*pi/w"
+angles = ["phi"]
+[parameters]
+w = 1.0
+A = 0.8
+"""
+
+
+def test_rotations(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A pendulum on a driven pivot turns once per period: phi(T) = phi(0) + 2 pi."""
+    (folder / "rotor.toml").write_text(ROTOR)
+    arguments = ["continue", "rotor.toml", "--parameter", "w", "--range", "1:1.1", "--winding", "phi=1"]
+    (facts,) = branches_of([*arguments, "--start", "phi_dot=1", "-o", "r.npz"], capsys)
+    orbit = st.load("r.npz").solution(-1)
+    assert facts["status"] == "parameter bound"
+    assert orbit(orbit.period)[0] - orbit(0.0)[0] == pytest.approx(2 * np.pi)
+
+
+def test_far_ends_are_named(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["continue", "autoparametric_pendulum", "--parameter", "Omega", "--range", "0.5:1.5", "--switch", "PD1"]
+    for pair in ("length_ratio=10", "Omega0=0.5", "xi1=0.02", "xi2=0.01"):
+        arguments += ["--set", pair]
+    assert main(arguments) == 0
+    assert "(parent's PD)" in capsys.readouterr().out
+
+
 MISTAKES = {
+    "harmonics of nothing": ([*DUFFING, "--harmonics", "3"], "harmonic-balance"),
+    "an angle twice": ([*DUFFING, "--winding", "u=1", "--winding", "u=2"], "--winding"),
+    "no such angle": ([*DUFFING, "--winding", "u=1"], "no angle"),
+    "turns of an equilibrium": ([*LORENZ, "--winding", "x=1"], "--method collocation"),
+    "no step": ([*LORENZ, "--ds-max", "0"], "--ds-max"),
     "no such parameter": ([*LORENZ[:3], "roh", *LORENZ[4:]], "did you mean 'rho'"),
     "no range": (LORENZ[:4], "--range"),
     "half a range": ([*LORENZ[:5], "3"], "from:to"),
