@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, InputError, unknown_name
+from ..errors import ConvergenceError, InputError, UnknownNameError, unknown_name
 from ..protocols import Tangent
 from ..words import Kind, Status, Verdict
 from .revival import revive
@@ -179,7 +179,127 @@ class Branch:
         for point in self.special:
             if point.label == label or (point.name and point.name == label):
                 return point
+        births = [p for p in self.special if p.kind in (Kind.BRANCH_POINT, Kind.PERIOD_DOUBLING)]
+        here = {p.kind.label for p in self.special}
+        if births and str(label).rstrip("0123456789") in {kind.label for kind in Kind} - here:
+            born = f"continuation(switch(branch['{births[0].label}']), '{self.name}', {self.window})['{label}']"
+            raise UnknownNameError(
+                f"no special point '{label}'; this branch has {', '.join(self.labels)}; it may lie on a branch that is "
+                f"born here: {born}"
+            )
         raise unknown_name("special point", label, self.labels, "this branch")
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return list(self)
+
+    def __repr__(self) -> str:
+        return f"Columns: {', '.join(self)}"
+
+
+@register("branch")
+@dataclass(frozen=True, eq=False, repr=False)
+class Branch:
+    """A family of solutions along one parameter; what `continuation` returns.
+
+    Attributes
+    ----------
+    name : str, the continued parameter;  window : (from, to)
+    parameter : (P,) its values;  rates : (P,) d(parameter)/ds;  arclength : (P,) in the scaled norm
+    unknowns, tangents : tuples of (N,) arrays, the problem's u and its unit tangents
+    meshes : tuple of problems (or their specs, after `load`);  mesh_of : (P,) which of them a point belongs to
+    params : mapping of all parameter values at the first point
+    values : (P, n) complex, multipliers (orbits) or eigenvalues (equilibria);  value_errors : (P,)
+    half_values : (P, n) complex or None, of the half-period map where orbits were solved on half of their period (their
+        squares are `values`)
+    verdicts : tuple of Verdict, one per point
+    residuals : (P,);  iterations : (P,);  marks : (P,) index into `special`, -1 for an ordinary point
+    special : tuple of SpecialPoint
+    status : Status of the end (``statuses`` of both ends);  method : mapping that says how it was computed
+    """
+
+    name: str
+    window: tuple[float, float]
+    parameter: Array
+    rates: Array
+    arclength: Array
+    unknowns: tuple[Array, ...]
+    tangents: tuple[Array, ...]
+    meshes: tuple[Any, ...] = field(repr=False)
+    mesh_of: NDArray[np.int64]
+    params: Mapping[str, float]
+    values: NDArray[np.complex128]
+    value_errors: Array
+    verdicts: tuple[Verdict, ...]
+    residuals: Array
+    iterations: NDArray[np.int64]
+    marks: NDArray[np.int64]
+    special: tuple[SpecialPoint, ...]
+    statuses: tuple[Status, Status]
+    method: Mapping[str, Any]
+    half_values: NDArray[np.complex128] | None = None
+    stored_columns: Mapping[str, Array] | None = field(default=None, repr=False)
+    stored_errors: Array | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        for key in ("parameter", "rates", "arclength", "value_errors", "residuals"):
+            object.__setattr__(self, key, frozen(getattr(self, key)))
+        for key in ("mesh_of", "iterations", "marks"):
+            object.__setattr__(self, key, frozen(getattr(self, key), np.int64))
+        object.__setattr__(self, "values", frozen(self.values, complex))
+        if self.half_values is not None:
+            object.__setattr__(self, "half_values", frozen(self.half_values, complex))
+        object.__setattr__(self, "verdicts", tuple(Verdict(v) for v in self.verdicts))
+        object.__setattr__(self, "statuses", tuple(Status(s) for s in self.statuses))
+        object.__setattr__(self, "params", MappingProxyType(dict(self.params)))
+        object.__setattr__(self, "method", MappingProxyType(dict(self.method)))
+
+    # ------------------------------------------------------------------ reading
+    def __len__(self) -> int:
+        return self.parameter.size
+
+    @property
+    def status(self) -> Status:
+        """Why the branch ended (its last end; ``statuses[0]`` tells about the first of a two-sided branch)."""
+        return self.statuses[1]
+
+    @property
+    def messages(self) -> tuple[str, str]:
+        """Why the branch stopped at either end, in words; empty where the status says it all."""
+        first, last = self.method.get("notes", ("", ""))
+        return str(first), str(last)
+
+    @property
+    def message(self) -> str:
+        """Why the branch ended, in words: what the last refused step ran into, or what was raised."""
+        return self.messages[1]
+
+    @cached_property
+    def columns(self) -> Columns:
+        """Named columns, (P,) each: the parameter, the problem's measures, arclength, residual."""
+        return Columns(self, self.stored_columns)
+
+    @cached_property
+    def error(self) -> Array:
+        """(P,) estimated discretisation error of every point."""
+        if self.stored_errors is not None:
+            return frozen(self.stored_errors)
+        return frozen([self._problem(i).error(self.unknowns[i], self._vector(i)) for i in range(len(self))])
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels of the special points, in the order of the branch."""
+        return tuple(p.label for p in self.special)
+
+    def __getitem__(self, label: str) -> SpecialPoint:
+        for point in self.special:
+            if point.label == label or (point.name and point.name == label):
+                return point
+        missing = unknown_name("special point", label, self.labels, "this branch")
+        births = [p for p in self.special if p.kind in (Kind.BRANCH_POINT, Kind.PERIOD_DOUBLING)]
+        if births:
+            born = f"continuation(switch(branch['{births[0].label}']), '{self.name}', {self.window})['{label}']"
+            raise UnknownNameError(f"{missing}; it may lie on a branch that is born on this one: {born}")
+        raise missing
 
     def _ipython_key_completions_(self) -> list[str]:
         return list(self.labels)

@@ -15,7 +15,7 @@ from exact_orbits import SMALL, amplitudes, assert_order, floquet_matrix, observ
 from scipy.optimize import brentq
 
 import stability as st
-from stability.errors import InputError
+from stability.errors import InputError, UnknownNameError
 from stability.systems.evaluators import evaluator
 
 
@@ -255,6 +255,19 @@ def test_default_pendulum_has_its_torus_points():
     flow = st.averaging(st.models.autoparametric_pendulum(), resonance=(2, 1))
     hopf = nontrivial(st.Equilibrium(flow), st.Kind.HOPF, (0.5, 1.5))
     assert hopf == pytest.approx([0.98487, 0.99988], abs=4e-4)
+
+
+def test_the_branch_at_rest_says_where_the_torus_point_is():
+    """HB1 lies on the branch that is born at BP1: the message is code, and run, it gives the point."""
+    flow = st.averaging(st.models.autoparametric_pendulum(), resonance=(2, 1))
+    branch = st.continuation(st.Equilibrium(flow), "Omega", (0.5, 1.5))
+    with pytest.raises(UnknownNameError, match="HB1") as caught:
+        branch["HB1"]
+    assert str(caught.value).endswith(": continuation(switch(branch['BP1']), 'Omega', (0.5, 1.5))['HB1']")
+    point = st.continuation(st.switch(branch["BP1"]), "Omega", (0.5, 1.5))["HB1"]
+    assert point.params["Omega"] == pytest.approx(0.98487, abs=4e-4)
+    with pytest.raises(UnknownNameError, match="did you mean 'BP2'"):
+        branch["BP3"]
 
 
 @pytest.mark.parametrize("name", ["g1", "g2"])
