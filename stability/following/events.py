@@ -30,6 +30,9 @@ _FEW = 6
 _STILL = 1e-10  # a scaled rate of the parameter that is rounding
 
 
+Triple = tuple[complex, complex, complex]
+
+
 class Changes(NamedTuple):
     """What the integers say happened between two points."""
 
@@ -178,18 +181,18 @@ def vertex(at: tuple[float, float, float], values: tuple[float, float, float]) -
     return Dip(x, value / math.copysign(second, y1), values, math.sqrt(smallest / abs(bend)))
 
 
-def dip_of(points: tuple[Point, Point, Point], which: int) -> Dip | None:
+def dip_of(points: tuple[Point, Point, Point], which: int, triples: list[Triple] | None = None) -> Dip | None:
     """The dip of a test function: 0 plus, 1 minus, 2 pair (`points.smooth_tests`), 3 rate of the parameter.
 
-    -1, -2: the deepest dip of any single real, any complex value followed through the three (see `matched_growth`); a
-    value that goes out and comes back inside a step is smoother by itself than in a product with all the others.
+    -1, -2: the deepest dip of any single real, any complex value followed through the three (see `matched`); a value
+    that goes out and comes back inside a step is smoother by itself than in a product with all the others.
     """
     p, q, r = points
     at = (p.s, q.s, r.s)
     if which >= 0:
         return vertex(at, (_test(p, which), _test(q, which), _test(r, which)))
     deepest = None
-    for values in _matched(points, which):
+    for values in growth_of(points, which, triples):
         size = abs(values[1])
         dip = vertex(at, values) if size < abs(values[0]) or size < abs(values[2]) else None
         if dip is not None and (deepest is None or dip.depth < deepest.depth):
@@ -201,26 +204,19 @@ def _test(p: Point, which: int) -> float:
     return p.tests[which] if which < 3 else p.tangent.parameter
 
 
-def matched_growth(points: tuple[Point, Point, Point], which: int) -> NDArray[np.float64]:
-    """(3, k) growth Re(lambda), or log|mu|, of the real (-1) or complex (-2) values of the middle point and their like.
+def growth_of(
+    points: tuple[Point, Point, Point], which: int, triples: list[Triple] | None = None
+) -> list[tuple[float, float, float]]:
+    """Growth Re(lambda), or log|mu|, of the real (-1) or complex (-2) values of the middle point and their like.
 
-    Values are matched to the nearest in the other two spectra, each used once.
+    `triples` are `matched` values, where they are known already.
     """
-    return np.array(_matched(points, which)).reshape(-1, 3).T
-
-
-def _matched(points: tuple[Point, Point, Point], which: int) -> list[tuple[float, float, float]]:
-    """The columns of `matched_growth`."""
-    first, middle, last = (p.spectrum.values for p in points)
-    values = middle.tolist()
-    wanted = [k for k, z in enumerate(values) if (z.imag == 0.0 if which == -1 else z.imag > 0.0)]
-    if not wanted or not first.size == middle.size == last.size:
-        return []
-    before, after = (_partners(middle, values, others) for others in (first, last))
-    triples = [(before[k], values[k], after[k]) for k in wanted]
+    if triples is None:
+        triples = matched(points)
+    wanted = [t for t in triples if (t[1].imag == 0.0 if which == -1 else t[1].imag > 0.0)]
     if not points[0].problem.critical.circle:
-        return [(x.real, y.real, z.real) for x, y, z in triples]
-    return [(_log(x), _log(y), _log(z)) for x, y, z in triples]
+        return [(x.real, y.real, z.real) for x, y, z in wanted]
+    return [(_log(x), _log(y), _log(z)) for x, y, z in wanted]
 
 
 def _log(z: complex) -> float:
@@ -229,14 +225,31 @@ def _log(z: complex) -> float:
     return math.log(size) if size else -math.inf
 
 
+def matched(points: tuple[Point, Point, Point]) -> list[Triple]:
+    """Every value of the middle point between its partners: the nearest in the other two spectra, each used once."""
+    first, middle, last = (p.spectrum.values for p in points)
+    if not first.size == middle.size == last.size:
+        return []
+    values = middle.tolist()
+    return list(zip(_partners(middle, values, first), values, _partners(middle, values, last)))
+
+
 def _partners(middle: NDArray[np.complex128], values: list[complex], others: NDArray[np.complex128]) -> list[complex]:
     """For every value its partner (see `_assigned`); a few values are nearest to different ones almost always."""
     listed = others.tolist()
-    if len(values) <= _FEW:
-        nearest = [min(range(len(listed)), key=lambda k, v=v: abs(v - listed[k])) for v in values]  # type: ignore[misc]
-        if len(set(nearest)) == len(values):
-            return [listed[k] for k in nearest]
-    return [listed[k] for k in _assigned(middle, others).tolist()]
+    if len(values) > _FEW:
+        return [listed[k] for k in _assigned(middle, others).tolist()]
+    chosen = []
+    for value in values:
+        least, place = math.inf, 0
+        for k, other in enumerate(listed):
+            gap = abs(value - other)
+            if gap < least:
+                least, place = gap, k
+        chosen.append(place)
+    if len(set(chosen)) < len(values):
+        chosen = _assigned(middle, others).tolist()
+    return [listed[k] for k in chosen]
 
 
 def _assigned(values: NDArray[np.complex128], others: NDArray[np.complex128]) -> NDArray[np.int64]:
@@ -260,5 +273,4 @@ def crossed(points: tuple[Point, Point, Point], which: int) -> bool:
     if which >= 0:
         y0, y1, y2 = (_test(p, which) for p in points)
         return y0 * y1 < 0 and y1 * y2 < 0
-    growth = matched_growth(points, which)
-    return bool(((growth[0] * growth[1] < 0) & (growth[1] * growth[2] < 0)).any())
+    return any(y0 * y1 < 0 and y1 * y2 < 0 for y0, y1, y2 in growth_of(points, which))

@@ -320,10 +320,11 @@ class Follower(Iterator[Point]):
             return f"the solution has grown by more than {_GROWTH:g}"
         # a family that stands still in the parameter: a homoclinic orbit whose period grows, a vertical branch
         recent = self._extent[-_STALL_POINTS:]
+        limit = _STALL / self.settings.weight
+        if len(recent) < _STALL_POINTS or abs(recent[0][1] - point.parameter) >= limit:
+            return ""
         values = [parameter for _, parameter in recent]
-        travelled = recent[-1][0] - recent[0][0]
-        still = max(values) - min(values) < _STALL / self.settings.weight
-        if len(recent) == _STALL_POINTS and still and travelled > _STALL_LENGTH:
+        if max(values) - min(values) < limit and point.s - recent[0][0] > _STALL_LENGTH:
             return f"the solutions change, but {self.settings.name} stands still at {point.parameter:.10g}"
         return ""
 

@@ -13,10 +13,8 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-import numpy as np
-
 from ..words import Kind
-from .events import crossed, dip_of, double_turn, matched_growth, supported
+from .events import Triple, crossed, dip_of, double_turn, growth_of, matched, supported
 from .locating import Found, Locator, shown
 from .points import Point
 
@@ -41,11 +39,12 @@ def between(
     cuts = [] if x is None else [(x, 3, 0.0)]
     doubtful = False
     if before is not None and supported(a, b):
+        triples = matched((before, a, b))
         for which in _tests(b):
-            dip = dip_of((before, a, b), which)
+            dip = dip_of((before, a, b), which, triples)
             if dip is not None and dip.depth < _DIP:
                 cuts.append((dip.at, which, dip.depth))
-        doubtful = _foretold(before, a, b) and hopped(locator, a, b)
+        doubtful = _foretold((before, a, b), triples) and hopped(locator, a, b)
     for x, which, depth in cuts:
         if x <= a.s and not behind:
             continue
@@ -63,20 +62,22 @@ def between(
     return found, doubtful and not found
 
 
-def _foretold(before: Point, a: Point, b: Point) -> bool:
-    """Whether a real value that came down toward the limit should have passed it before b, or almost, and has not.
+def _foretold(points: tuple[Point, Point, Point], triples: list[Triple]) -> bool:
+    """Whether a real value that came down toward the limit should have passed it, or almost, and has not.
 
-    Going on as from `before` to a it changes sign before b, or it is far smaller than `stepping.room` lets it become.
+    Going on as between the first two it changes sign before the third, or it is far smaller than `stepping.room` lets
+    it become.
     A value at a fold vanishes with the parameter's rate: only their ratio tells of a branch point.
     """
-    rates = np.abs([[before.tangent.parameter], [a.tangent.parameter], [b.tangent.parameter]])
-    if not b.step > 0 < a.step or not rates.all():
+    r0, r1, r2 = (abs(p.tangent.parameter) for p in points)
+    if not points[2].step > 0 < points[1].step or not (r0 and r1 and r2):
         return False
-    growth = matched_growth((before, a, b), -1) / rates
-    ahead = growth[1] + (growth[1] - growth[0]) * (b.step / a.step)
-    same = (growth[0] * growth[1] > 0) & (growth[1] * growth[2] > 0)
-    passed = (ahead * growth[1] < 0) | (np.abs(growth[2]) < _SUDDEN * np.abs(growth[1]))
-    return bool((same & passed).any())
+    for y0, y1, y2 in growth_of(points, -1, triples):
+        before, now, then = y0 / r0, y1 / r1, y2 / r2
+        ahead = now + (now - before) * (points[2].step / points[1].step)
+        if before * now > 0 and now * then > 0 and (ahead * now < 0 or abs(then) < _SUDDEN * abs(now)):
+            return True
+    return False
 
 
 def hopped(locator: Locator, a: Point, b: Point) -> bool:

@@ -219,9 +219,7 @@ def _roughness(leading, h, scales, nodes, Y):  # type: ignore[no-untyped-def]
     n, degree = scales.shape[0], leading.shape[0] - 1
     largest = 0.0
     for j in range(h.shape[0]):
-        power = 1.0
-        for i in range(degree):
-            power *= h[j]
+        power = h[j] ** degree
         for a in range(n):
             value = leading[0] * nodes[j, a]
             for i in range(degree):
