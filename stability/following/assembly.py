@@ -97,7 +97,6 @@ def _special(settings: Settings, point: Point, found: Found, label: str) -> Spec
         kind=found.kind,
         label=label,
         params=dict(zip(problem.parameters, point.params.tolist())),
-        solution=problem.view(point.u, point.params),
         multipliers=_whole(problem, point.spectrum.values),
         half_multipliers=point.spectrum.values if getattr(problem, "halved", False) else None,
         breaking=True if found.breaking else None,

@@ -53,7 +53,6 @@ class SpecialPoint:
     kind: Kind
     label: str
     params: Mapping[str, float]
-    solution: Any
     multipliers: NDArray[np.complex128]
     bracket: tuple[float, float]
     free: str
@@ -65,6 +64,7 @@ class SpecialPoint:
     name: str = ""
     half_multipliers: NDArray[np.complex128] | None = None
     breaking: bool | None = field(default=None, repr=False)  # None: not looked at yet
+    stored: Any = field(default=None, repr=False)  # the solution, where it was read from a file
     normal: tuple[float | None, Criticality | None] | None = field(default=None, repr=False)  # None: not computed yet
 
     def __post_init__(self) -> None:
@@ -84,6 +84,11 @@ class SpecialPoint:
     def problem(self) -> Any:
         """The problem on whose mesh it was located (rebuilt from its description after `load`)."""
         return revive(self.source) if isinstance(self.source, Mapping) else self.source
+
+    @cached_property
+    def solution(self) -> Any:
+        """The orbit or the fixed point (computed when first asked for)."""
+        return self.problem.view(np.array(self.u), self.params_vector) if self.stored is None else self.stored
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
@@ -220,7 +225,7 @@ class SpecialPoint:
         normal = (fields.pop("coefficient"), fields.pop("criticality"))
         own: dict[str, Any] = {k: arrays[k] for k in ("multipliers", "u", "direction")}
         own["half_multipliers"] = arrays.get("half_multipliers")
-        return cls(solution=solution, normal=normal, **own, **fields)
+        return cls(stored=solution, normal=normal, **own, **fields)
 
     def save(self, path: Any) -> None:
         """Write to a ``.npz`` file that `stability.load` reads."""
