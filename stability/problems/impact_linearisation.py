@@ -72,7 +72,7 @@ class ImpactLinearisation(ShootingLinearisation):
             if mark < 0:
                 maps.append(None)
                 continue
-            wall = self.problem.walls[mark]
+            wall = self.problem.contacts[mark]
             R = np.eye(self.n)
             R[wall.velocity, wall.velocity] = -wall.restitution
             maps.append(R)
@@ -88,7 +88,7 @@ class ImpactLinearisation(ShootingLinearisation):
         walls = []
         for end, mark in zip(ends, problem.marks):
             if mark >= 0:
-                wall = problem.walls[mark]
+                wall = problem.contacts[mark]
                 walls.append(wall.side * (wall.position - end[wall.coordinate]))
         out = np.append(np.ravel(matching), walls)
         if self.own:
@@ -131,7 +131,7 @@ class ImpactLinearisation(ShootingLinearisation):
             after = (j + 1) % count
             A[j * n : (j + 1) * n, after * n : (after + 1) * n] -= np.eye(n)
             if R is not None:
-                wall = problem.walls[problem.marks[j]]
+                wall = problem.contacts[problem.marks[j]]
                 A[row] = -wall.side * E[wall.coordinate]
                 row += 1
         if self.own:
@@ -142,7 +142,7 @@ class ImpactLinearisation(ShootingLinearisation):
         """dF/dp_name, (N,): at fixed phase for forced systems."""
         slopes = self.parts.slopes[:, :, self.problem.index(name)]
         matching = [slope if R is None else R @ slope for R, slope in zip(self._maps(), slopes)]
-        walls = [self.problem.walls[mark] for mark in self.problem.marks]
+        walls = [self.problem.contacts[mark] for mark in self.problem.marks]
         events = [
             -wall.side * slope[wall.coordinate] for wall, mark, slope in zip(walls, self.problem.marks, slopes)
             if mark >= 0
@@ -204,7 +204,7 @@ class ImpactLinearisation(ShootingLinearisation):
         for j, R in enumerate(self._maps()):
             factors.append(self.parts.matrices[j])
             if R is not None:
-                wall = self.problem.walls[self.problem.marks[j]]
+                wall = self.problem.contacts[self.problem.marks[j]]
                 gradient = np.zeros(self.n)
                 gradient[wall.coordinate] = -wall.side
                 factors.append(saltation(R, self.parts.last[j], self.parts.first[j + 1], gradient))

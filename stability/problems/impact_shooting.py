@@ -66,12 +66,12 @@ class ImpactShooting(Shooting):
         super().__post_init__()
         object.__setattr__(self, "marks", tuple(int(m) for m in self.marks))
         object.__setattr__(self, "cuts", tuple(float(c) for c in self.cuts))
-        if sum(m < 0 for m in self.marks) != len(self.cuts) or max(self.marks, default=-1) >= len(self.walls):
+        if sum(m < 0 for m in self.marks) != len(self.cuts) or max(self.marks, default=-1) >= len(self.contacts):
             raise InputError(f"marks = {self.marks} and cuts = {self.cuts} do not fit each other or the stops")
 
     # ------------------------------------------------------------------ layout
     @cached_property
-    def walls(self) -> tuple[Wall, ...]:
+    def contacts(self) -> tuple[Wall, ...]:
         """The stops of the system."""
         guards = Engine.of(self.system).guards
         return () if guards is None else guards.walls
@@ -127,7 +127,7 @@ class ImpactShooting(Shooting):
     @cached_property
     def row_sizes(self) -> Array:
         """(N,) natural sizes of the equations."""
-        walls = [self.scales[self.walls[m].coordinate] for m in self.marks if m >= 0]
+        walls = [self.scales[self.contacts[m].coordinate] for m in self.marks if m >= 0]
         return np.concatenate([np.tile(self.scales, self.count), walls, [1.0] * self.own])
 
     @cached_property
@@ -215,7 +215,7 @@ class ImpactShooting(Shooting):
         """(clearance, wall, time in periods, state) of every extremum towards a wall between impacts."""
         found = []
         for times, coefficients in self.motion(u, params):
-            for number, wall in enumerate(self.walls):
+            for number, wall in enumerate(self.contacts):
                 for s in piecewise.crossings(times, coefficients[:, :, wall.velocity], -wall.side):
                     x = piecewise.at(times, coefficients, np.array([s]))[0]
                     gap = wall.side * (wall.position - x[wall.coordinate]) / self.scales[wall.coordinate]
@@ -224,7 +224,7 @@ class ImpactShooting(Shooting):
 
     def speeds(self, u: Array, params: Array) -> Array:
         """(q,) speeds towards the walls at the impacts, over the scales of the velocities."""
-        edges, walls = self.edges(u), [self.walls[m] if m >= 0 else None for m in self.marks]
+        edges, walls = self.edges(u), [self.contacts[m] if m >= 0 else None for m in self.marks]
         ends = {}
         for times, coefficients in self.motion(u, params):
             ends[float(times[-1])] = coefficients[-1].sum(axis=0)
@@ -250,7 +250,7 @@ class ImpactShooting(Shooting):
         gone = np.array([impact.time for impact, speed in old if speed < _TOUCHING])
         for gap, number, s, x in touches:
             if abs(gap) < _TOUCHING and not (np.abs(gone - s) < _SAME_TIME).any():
-                wall = self.walls[number]
+                wall = self.contacts[number]
                 x[wall.coordinate], x[wall.velocity] = wall.position, -wall.restitution * x[wall.velocity]
                 impacts.append(Impact(s, number, x))
         return self._relaid(u, params, sorted(impacts, key=lambda impact: impact.time))
@@ -295,7 +295,7 @@ class ImpactShooting(Shooting):
     def measures(self, u: Array, params: Array) -> dict[str, float]:
         """The columns of all orbits, then ``impacts`` (in a period), ``impact_speed.max``, ``.min`` (0 without any)."""
         out, params = super().measures(u, params), np.asarray(params, float)
-        scales = np.array([self.scales[self.walls[m].velocity] for m in self.marks if m >= 0])
+        scales = np.array([self.scales[self.contacts[m].velocity] for m in self.marks if m >= 0])
         speeds = np.abs(self.speeds(u, params)) * scales
         out["impacts"] = float(self.impacts)
         out["impact_speed.max"] = float(speeds.max(initial=0.0))
