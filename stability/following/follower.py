@@ -250,6 +250,7 @@ class Follower(Iterator[Point]):
             failure = error
         if self._stops(found):
             return
+        self._part(last, point, found)
         at_point = self._value_at(point)
         self.entries.append(Entry(point, at_point))
         self.accepted += 1
@@ -306,6 +307,15 @@ class Follower(Iterator[Point]):
         if found and found[0].point.s < self.last.s:  # seen late: it belongs before the last point
             self.entries.sort(key=lambda e: e.point.s)
         return False
+
+    def _part(self, a: Point, b: Point, found: list[Found]) -> None:
+        """A point between neighbouring events of one step, so that the stretch between them has a verdict."""
+        own = [f.point for f in found if f.kind is not Kind.USER and f.point.s > a.s]
+        middles = [self.locator.on_curve(a, b, (0.5 * (p.s + q.s) - a.s) / (b.s - a.s)) for p, q in pairwise(own)]
+        between = [m for m, (p, q) in zip(middles, pairwise(own)) if m is not None and p.s < m.s < q.s]
+        if between:
+            self.entries.extend(Entry(m, None) for m in between)
+            self.entries.sort(key=lambda e: e.point.s)
 
     def _named_stop(self, found: Found) -> bool:
         prefix = found.kind.label

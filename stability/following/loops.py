@@ -50,24 +50,34 @@ class Home:
 
 
 def _same(p: Point, q: Point) -> bool:
-    one, other = _invariants(p), _invariants(q)
+    (one, angles), (other, _) = _invariants(p), _invariants(q)
     if one.shape != other.shape:
         return False
-    size = np.maximum(np.abs(one), np.abs(other)).max(axis=1)
-    return bool((np.abs(one - other).max(axis=1) <= _SAME * size + _NOTHING * size.max(initial=0.0)).all())
+    size, gap = np.maximum(np.abs(one), np.abs(other)).max(axis=1), one - other
+    # an angle that went once round is where it was
+    gap[angles] -= 2 * np.pi * np.round(gap[angles].mean(axis=1, keepdims=True) / (2 * np.pi))
+    return bool((np.abs(gap).max(axis=1) <= _SAME * size + _NOTHING * size.max(initial=0.0)).all())
 
 
-def _invariants(point: Point) -> NDArray[np.float64]:
-    """(k, 2) numbers of a solution that depend neither on its mesh nor on its phase: extrema of every state, period."""
+def _invariants(point: Point) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """(k, 2) numbers of a solution that depend neither on its mesh nor on its phase, and which of them are angles.
+
+    Extrema of every state, and the period.
+    """
+    system = getattr(point.problem, "system", None)
+    angles = getattr(system, "angles", ())
     measures = point.problem.measures(point.u, point.params)
-    states = [name[:-4] for name in measures if name.endswith(".max")]
+    # of outputs only samples at the mesh are known
+    states = [s for s in getattr(system, "states", ()) if f"{s}.max" in measures]
     if states and "period" in measures:
         rows = [[measures[f"{s}.max"], measures[f"{s}.min"]] for s in states]
-        return np.array([*rows, [measures["period"], measures["period"]]])
+        values = np.array([*rows, [measures["period"], measures["period"]]])
+        return values, np.array([*(s in angles for s in states), False])
     solution = point.problem.view(point.u, point.params)
     if isinstance(solution, FixedPoint):
-        return np.repeat(solution.x[:, None], 2, axis=1)
-    return np.repeat(np.array(list(measures.values()))[:, None], 2, axis=1)
+        return np.repeat(solution.x[:, None], 2, axis=1), np.array([s in angles for s in solution.states])
+    values = np.repeat(np.array(list(measures.values()))[:, None], 2, axis=1)
+    return values, np.zeros(len(values), bool)
 
 
 def collapsed(point: Point) -> str | None:
