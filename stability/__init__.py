@@ -14,6 +14,7 @@ from ._version import __version__ as __version__
 # public name -> module that defines it
 _EXPORTS: dict[str, str] = {
     "families": "following.families",
+    "loci": "following.sheets",
     "locus": "problems.locus_starting",
     "switch": "problems.switching",
     "solve": "following.driver",

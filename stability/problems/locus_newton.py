@@ -27,6 +27,7 @@ __all__ = ["corrected", "response", "sharpened"]
 Array = NDArray[np.float64]
 _MAX_NEWTON = 10
 _NEAR = 1e-4  # size of a full step, in the weighted norm relative to 1 + |u|, after which a cheap one is tried
+_STALLED = 1e-7  # rounding may stop the decrease above the tolerance: steps below this that do not shrink are the last
 _UNFOLDED = 1e-7
 
 
@@ -100,7 +101,8 @@ def corrected(
             if not math.isfinite(step.size):
                 return failed(at.u, at.params, iteration, "singular")
             at.take(step)
-            if at.settled(step, tolerance):
+            stalled = 0.25 * last < step.size <= _STALLED * at.scale
+            if at.settled(step, _STALLED if stalled else tolerance):
                 return _succeeded(at, step.others, iteration, True)
             if (iteration > 2 and step.size > 4 * last) or step.size > 1e6 * at.scale:
                 break
