@@ -11,6 +11,7 @@ no fold on the rising family, each asymmetric orbit the mirror image of its part
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import _figure
 import numpy as np
 
 import stability as st
+from stability.errors import OpenResonanceWarning
 from stability.plots import style
 
 WINDOW = (0.3, 3.0)
@@ -30,11 +32,16 @@ def compute() -> dict[str, Any]:
     opened = st.Collocation(st.models.duffing(xi=0.02, beta=0.05))
     textbook = st.Collocation(st.models.duffing_textbook(delta=0.1, alpha=1, beta=1, gamma=5))
     symmetric = st.continuation(textbook, "omega", (0.6, 2.5), **FINE)
+    with warnings.catch_warnings(record=True) as caught:  # the library says that the resonance is open
+        warnings.simplefilter("always", OpenResonanceWarning)
+        rising = st.continuation(opened, "Omega", WINDOW, **FINE)
+        detached = st.continuation(opened, "Omega", WINDOW[::-1], **FINE)
     return {
+        "warnings": [w.category for w in caught],
         "closed": st.continuation(closed, "Omega", WINDOW, **FINE),
         "closed, from above": st.continuation(closed, "Omega", WINDOW[::-1]),
-        "rising": st.continuation(opened, "Omega", WINDOW, **FINE),
-        "detached": st.continuation(opened, "Omega", WINDOW[::-1], **FINE),
+        "rising": rising,
+        "detached": detached,
         "symmetric": symmetric,
         "asymmetric": st.continuation(st.switch(symmetric["BP1"]), "omega", (0.6, 2.5), **FINE),
     }
@@ -45,6 +52,7 @@ def check(data: dict[str, Any]) -> None:
     for name in ("closed", "closed, from above"):
         folds = sorted(p.params["Omega"] for p in data[name].of_kind(st.Kind.FOLD))
         assert np.allclose(folds, [1.088436639, 1.380933030], rtol=0, atol=2e-9), folds
+    assert data["warnings"] and set(data["warnings"]) == {OpenResonanceWarning}
     assert not data["rising"].special and data["rising"].count(st.Verdict.UNSTABLE) == 0
     (fold,) = data["detached"].special
     assert fold.kind is st.Kind.FOLD and abs(fold.params["Omega"] - 1.416368134) < 2e-9

@@ -20,6 +20,7 @@ __all__ = [
     "InputError",
     "MissingDependencyError",
     "NonFiniteError",
+    "OpenResonanceWarning",
     "ResourceLimitError",
     "StabilityError",
     "StabilityWarning",
@@ -95,6 +96,10 @@ class StabilityWarning(UserWarning):
 
 class TruncationWarning(StabilityWarning):
     """Too few harmonics, nodes or intervals for the accuracy asked for; says how many are missing."""
+
+
+class OpenResonanceWarning(StabilityWarning):
+    """A resonance that never turns back: its branch has no peak, and the lower branch is not connected with it."""
 
 
 class UnsettledWarning(StabilityWarning):

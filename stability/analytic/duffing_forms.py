@@ -21,7 +21,7 @@ import warnings
 import numpy as np
 import numpy.typing as npt
 
-from ..errors import InputError, StabilityWarning
+from ..errors import InputError, OpenResonanceWarning
 
 __all__ = [
     "duffing_amplitudes",
@@ -231,7 +231,7 @@ def duffing_peak(*, xi: float, beta: float) -> tuple[float, float]:
         warnings.warn(
             f"open resonance: beta = {beta:g} >= 16 xi^2/3 = {16 * xi**2 / 3:g}, so that the upper branch under base "
             "excitation never turns back; more damping or a smaller base amplitude closes the peak",
-            StabilityWarning,
+            OpenResonanceWarning,
             stacklevel=2,
         )
         return math.inf, math.inf

@@ -23,6 +23,7 @@ from .assembly import assemble, resumed, turned
 from .follower import Entry, Follower
 from .images import with_images
 from .locating import Found
+from .open_resonance import warn_if_open
 from .points import Point
 from .settings import Settings, checked
 from .starting import born_sides, first_point, inside_window
@@ -110,7 +111,9 @@ def continuation(
         problem, name, window, ds=ds, ds_max=ds_max, max_points=max_points, at=at, events=events, stop_at=stop_at,
         tolerance=tolerance, progress=progress,
     )
-    return _walk(problem, start, settings).run().branch
+    branch = _walk(problem, start, settings).run().branch
+    warn_if_open(branch)
+    return branch
 
 
 def steps(

@@ -15,7 +15,7 @@ from exact_orbits import SMALL, amplitudes, assert_order, observed_orders, orbit
 from scipy.optimize import brentq, fsolve
 
 import stability as st
-from stability.errors import InputError, StabilityWarning
+from stability.errors import InputError, OpenResonanceWarning
 
 XI, F, A = 0.1, 0.7, 1.5
 
@@ -186,7 +186,7 @@ def test_peak_under_base_excitation():
     assert np.abs(slow(0.0, [0.0, a])).max() < 1e-13
     limit = 16 * 0.02**2 / 3
     for beta in (limit * 1.0001, 0.01):
-        with pytest.warns(StabilityWarning, match="open resonance"):
+        with pytest.warns(OpenResonanceWarning, match="open resonance"):
             assert st.duffing_peak(xi=0.02, beta=beta)[0] == math.inf
         assert np.isfinite(st.duffing_frequencies(np.array([1e3, 1e5]), xi=0.02, beta=beta)).all()  # never closes
     with warnings.catch_warnings():
