@@ -56,6 +56,26 @@ def test_the_same_orbits(pair):
             assert a.verdict is b.verdict
 
 
+@pytest.mark.parametrize(
+    ("values", "name", "window", "number"),
+    [
+        (dict(delta=0.2, alpha=-1.0, gamma=1.0), "omega", (4.0, 0.3), 8),  # double well
+        (dict(delta=0.1, alpha=-1.0, gamma=3.0), "omega", (6.0, 0.4), 8),
+        (dict(delta=0.1, beta=-0.1, gamma=0.2), "omega", (0.2, 3.0), 1),  # softening
+        (dict(delta=0.1, omega=0.5), "gamma", (0.1, 60.0), 15),
+    ],
+)
+def test_labels_of_other_oscillators(values, name, window, number):
+    """x'' + delta x' + alpha x + beta x^3 = gamma cos(omega t), both ways."""
+    system = st.models.duffing_textbook(**values)
+    problems = [st.Collocation(system, symmetry=s, accuracy=1e-11) for s in (None, "auto")]
+    whole, half = (st.continuation(p, name, window) for p in problems)
+    assert whole.labels == half.labels and len(half.labels) == number and whole.statuses == half.statuses
+    for p, q in zip(whole.special, half.special):
+        assert q.params[name] == pytest.approx(p.params[name], rel=1e-9, abs=1e-9)
+        assert q.symmetry_breaking is (q.kind is Kind.BRANCH_POINT)
+
+
 def shot(force, omega, x0):
     """(x0, omega) with x(T/2) = -x0 and det(N + I) = 0, N = -Phi(T/2), by DOP853."""
 
