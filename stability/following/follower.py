@@ -43,6 +43,7 @@ _ADAPT_EVERY = 3
 _GROWTH = 1e6
 _STALL_POINTS, _STALL, _STALL_LENGTH = 8, 1e-8, 0.05
 _PATIENCE = 6
+_ONE = 1e-7  # two events nearer to each other than this are one
 
 
 def _gap(value: float, point: Point) -> float:
@@ -429,10 +430,15 @@ class Follower(Iterator[Point]):
 
     def _known(self, found: Found) -> bool:
         """Whether this event is among the entries already (a segment that is searched again)."""
+        point, weight = found.point, self.settings.weight
         for entry in reversed(self.entries):
-            if entry.point.s < found.point.s - 1e-6:
+            known = entry.point
+            if known.s < point.s - self.settings.steps.longest:
                 return False
-            same = entry.found is not None and entry.found.kind is found.kind
-            if same and abs(entry.point.s - found.point.s) < 1e-6:
+            if entry.found is None or entry.found.kind is not found.kind or known.u.size != point.u.size:
+                continue
+            # not by arclength: other scales measure it otherwise
+            du, dl = known.u - point.u, (known.parameter - point.parameter) * weight
+            if dot(point.problem.weights, du, du) + dl * dl < _ONE**2:
                 return True
         return False

@@ -189,6 +189,71 @@ def test_rotations_are_followed(rotation):
         assert (here(here.period) - here(0.0))[1] / here.period == pytest.approx(2.0, rel=1e-11)
 
 
+@pytest.fixture(scope="module")
+def rotating(rotation):
+    """The rotating family over the forcing frequency, from the simulated rotation at Omega = 2."""
+    _, problem, _, orbit = rotation
+    return st.continuation(problem, "Omega", (0.3, 4.0), start=orbit)
+
+
+def test_rotations_over_the_frequency_are_a_loop(rotating):
+    """Between two folds, one rotation at each end of the window's part; theta(0) goes once round on the way."""
+    assert rotating.status is st.Status.CLOSED_LOOP and not rotating.of_kind(st.Kind.UNEXPLAINED)
+    assert rotating.parameter.min() == pytest.approx(0.5741376295, abs=1e-8)
+    assert rotating.parameter.max() == pytest.approx(3.5078830099, abs=1e-8)
+    counts = {kind: len(rotating.of_kind(kind)) for kind in (st.Kind.FOLD, st.Kind.PERIOD_DOUBLING)}
+    assert counts == {st.Kind.FOLD: 4, st.Kind.PERIOD_DOUBLING: 6}
+    assert len(rotating.of_kind(st.Kind.NEIMARK_SACKER)) == 3 and len(rotating.special) == 13
+    for index in range(0, len(rotating), 10):
+        orbit = rotating.solution(index)
+        omega = rotating.parameter[index]
+        assert (orbit(orbit.period) - orbit(0.0))[1] / orbit.period == pytest.approx(omega, rel=1e-11)
+    assert "undetermined" not in {str(s.verdict) for s in rotating.segments()}
+
+
+def test_both_ends_are_the_same_points_from_another_start(rotating, rotation):
+    _, problem, _, _ = rotation
+    start = rotating.at(Omega=1.5)[0]
+    again = st.continuation(problem, "Omega", (0.3, 4.0), start=start)
+    assert again.status is st.Status.CLOSED_LOOP
+    one, two = (sorted(p.params["Omega"] for p in b.special) for b in (rotating, again))
+    np.testing.assert_allclose(one, two, atol=1e-8)
+
+
+def turns_after(system, orbit, Omega, periods):
+    """Mean speed over Omega, and the distance from the orbit, after so many periods from a disturbed state."""
+    x0 = orbit(0.0) + 1e-4 * np.array([1.0, -1.0, 0.5, 1.0])
+    motion = st.simulate(system, (0, periods * orbit.period), x0=x0, rtol=1e-10, atol=1e-10, Omega=Omega)
+    end, half = motion(periods * orbit.period), motion(periods // 2 * orbit.period)
+    speed = (end[1] - half[1]) / (periods - periods // 2) / orbit.period
+    away = end - orbit(0.0)
+    away[1] -= 2 * np.pi * round(away[1] / (2 * np.pi))
+    return speed / Omega, float(np.abs(away).max())
+
+
+@pytest.mark.parametrize(("omega", "stable"), [(1.70, False), (1.85, True), (3.45, True), (1.10, True), (1.15, False)])
+def test_rotations_by_simulation(rotating, rotation, omega, stable):
+    """On both sides of the torus point 1.7784, of the doubling 1.1122, and just before the fold 3.5079."""
+    system = rotation[0]
+    wanted = st.Verdict.STABLE if stable else st.Verdict.UNSTABLE
+    orbits = [o for o in rotating.at(Omega=omega) if o.verdict is wanted]
+    assert orbits and (stable or len(orbits) == len(rotating.at(Omega=omega)))
+    for orbit in orbits:
+        modulus = float(np.abs(orbit.multipliers).max())
+        periods = min(600, int(np.ceil(8 / abs(np.log(modulus)))))
+        speed, away = turns_after(system, orbit, omega, periods)
+        if stable:
+            assert speed == pytest.approx(1.0, abs=1e-4) and away < 1e-5
+        else:
+            assert away > 1e-3
+
+
+def test_beyond_the_fold_rotation_is_lost(rotating, rotation):
+    orbit = rotating["LP1"].solution
+    speed, _ = turns_after(rotation[0], orbit, 3.56, 400)
+    assert abs(speed - 1.0) > 0.01
+
+
 def test_rotation_of_the_pendulum_on_a_driven_pivot():
     """No guess is needed; det M = exp(-2 xi T) at each point."""
     system = st.models.base_driven_pendulum(xi=0.05, epsilon=0.3, Omega=2.0)
