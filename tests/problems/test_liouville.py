@@ -10,6 +10,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+import sympy as sp
 
 import stability as st
 from stability.problems.orbit_spectrum import liouville_gap
@@ -57,10 +58,15 @@ def test_errors_on_a_branch_contain_the_gap():
 
 
 def test_halved_orbits_keep_the_orientation_of_their_symmetry():
-    """N = S^-1 Phi of the half period with S = -1 on two states: det S = +1; a reflection of one state: -1."""
-    even = st.Collocation(st.models.duffing(), symmetry=-np.eye(2))
-    odd = st.Collocation(st.models.duffing(), symmetry=np.diag([1.0, -1.0]))
-    assert (even.orientation, odd.orientation) == (1.0, -1.0)
-    p = even.system.parameter_vector()
-    L = even.linearise(even.start(p), p)
-    assert liouville_gap(even.spectrum(L).values, even._growth_of_volume(L), even.orientation) < 1e-10
+    """N = S^-1 Phi of the half period with S = -1 on two states: det S = +1; on the one state of x' = -x + cos: -1."""
+    t, Omega = sp.symbols("t Omega", real=True)
+    x = sp.Function("x")(t)
+    relaxing = st.System.from_equations(
+        {x.diff(t): -x - x**3 + sp.cos(Omega * t)}, coordinates=[x], parameters={"Omega": 1.0}, period=2 * sp.pi / Omega
+    )
+    problems = [st.Collocation(system, symmetry="auto") for system in (st.models.duffing(), relaxing)]
+    assert [problem.orientation for problem in problems] == [1.0, -1.0]
+    for problem in problems:
+        p = problem.system.parameter_vector()
+        L = problem.linearise(problem.start(p), p)
+        assert liouville_gap(problem.spectrum(L).values, problem._growth_of_volume(L), problem.orientation) < 1e-10
