@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ConvergenceError, InputError
+from ..errors import ConvergenceError, InputError, NonFiniteError
 from ..protocols import Corrected
 
 if TYPE_CHECKING:
@@ -148,7 +148,13 @@ def _from_rest(problem: OrbitDiscretisation, params: Array) -> Array:
     found = _newton(problem, problem.packed(problem.places[:, None] * problem.winding, 0.0), params)
     if found.converged:
         return found.u
-    return _from_transients(problem, params, np.zeros(problem.system.n))
+    first = f"Newton's method from rest ({found.note}; residual {found.residual:.1e})"
+    try:
+        return _from_transients(problem, params, np.zeros(problem.system.n))
+    except NonFiniteError as error:
+        raise NonFiniteError(f"tried {first}, then transients from rest: {error}") from error
+    except ConvergenceError as error:
+        raise ConvergenceError(f"tried {first}, then transients from rest: {error}", **error.data) from error
 
 
 def _from_transients(problem: OrbitDiscretisation, params: Array, state: Array) -> Array:
@@ -157,7 +163,7 @@ def _from_transients(problem: OrbitDiscretisation, params: Array, state: Array) 
     turns = problem.whole_winding
     times, states, period = settled_orbit(problem.system, params, state, problem.multiple, turns, _TRANSIENTS)
     interpolant = _periodic_cubic(times, states)
-    return _settled(problem, from_function(problem, interpolant, period), params, f"transients from {state.tolist()}")
+    return _settled(problem, from_function(problem, interpolant, period), params, "the end of transients")
 
 
 def _periodic_cubic(times: Array, states: Array) -> Callable[[Array], Array]:

@@ -68,3 +68,10 @@ def test_variables_of_very_different_size():
     assert branch.columns["x"] == pytest.approx(1e3 * np.cbrt(branch.parameter), rel=1e-9)
     assert branch.columns["y"] == pytest.approx(1e12 * np.cbrt(branch.parameter), rel=1e-9)
     assert branch.count(st.Verdict.UNSTABLE) == 0
+
+
+def test_a_failed_start_says_what_was_tried():
+    """An undamped linear oscillator at resonance has no periodic motion."""
+    resonant = st.Collocation(st.models.duffing(xi=0.0, beta=0.0, Omega=1.0))
+    with pytest.raises(ConvergenceError, match=r"tried Newton's method from rest \(.*\), then transients from rest"):
+        st.solve(resonant)
