@@ -37,7 +37,7 @@ _SIZES = (1.0, 0.3, 1e-3)  # of the random states at which equations are compare
 _POINTS = 6  # per size
 _CLOSE = 1e-9
 _FEWEST = 4  # points at which the equations must be finite
-_MAX_OPERATIONS = 4000  # of an equation whose quotients are brought to one denominator
+_MAX_OPERATIONS, _MAX_QUOTIENTS = 20000, 1000  # of an equation to be expanded, to be brought to one denominator
 
 
 @dataclass(frozen=True, repr=False)
@@ -204,8 +204,10 @@ def proved_symbolically(system: System, symmetry: Symmetry) -> bool:
     fields = {s: e.xreplace(constants) for s, e in zip(system.states, system.rhs)}
     for name, (sign, image) in signed.items():
         gap = fields[name].subs(change, simultaneous=True) - sign * fields[image]
+        if gap.count_ops() > _MAX_OPERATIONS:
+            return False
         gap = sp.expand(gap)
-        if gap != 0 and gap.count_ops() < _MAX_OPERATIONS:
+        if gap != 0 and gap.count_ops() < _MAX_QUOTIENTS:
             gap = sp.expand(sp.numer(sp.together(gap)))
         if gap != 0:
             return False
