@@ -15,14 +15,20 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, unknown_name
 from ..words import Kind, Verdict
+from .curves import smooth_pieces
 from .style import SERIES, axis_label, line, marker
 
 if TYPE_CHECKING:
-    from ..results.branch import Branch
+    from ..results.branch import Branch, Segment
     from ..results.solutions import PeriodicOrbit
     from ..results.special import SpecialPoint
 
 __all__ = ["plot_branch", "plot_multipliers", "plot_orbit"]
+
+Array = NDArray[np.float64]
+
+
+_PARENT = "parent's"  # names of ends on a parent's special point begin with it
 
 
 def _axes(ax: Any) -> Any:
@@ -52,6 +58,7 @@ def plot_branch(
     color: str | None = None,
     labels: bool = True,
     kinds: tuple[Kind, ...] | None = None,
+    smooth: bool = True,
     **style: Any,
 ) -> list[Any]:
     """Draw a column of a branch over its parameter.
@@ -69,6 +76,8 @@ def plot_branch(
         Write the labels (LP1, PD1, ...) beside the markers.
     kinds : tuple of Kind or None
         Which special points to mark; None marks all but the points asked for by value.
+    smooth : bool
+        Cubics between the points (see `curves`); False draws straight lines from point to point.
     **style
         Passed on to ``Axes.plot`` of the lines; a ``label`` names the first stable stretch (or the first).
 
@@ -90,18 +99,28 @@ def plot_branch(
     artists: list[Any] = []
     segments, legend = branch.segments(), style.pop("label", None)
     named = next((k for k, s in enumerate(segments) if s.verdict is Verdict.STABLE), 0)
+    rates = branch.rates if x == branch.name else None
+    pieces = smooth_pieces(abscissa, ordinate, rates) if smooth else None
     for k, segment in enumerate(segments):
-        part = slice(segment.start, segment.stop)
+        part = _part(abscissa, ordinate, pieces, segment)
         look = {**line(segment.verdict), "color": color, **style}
-        artists += ax.plot(abscissa[part], ordinate[part], label=legend if k == named else None, **look)
+        artists += ax.plot(*part, label=legend if k == named else None, **look)
     for index, point in _marked(branch, kinds):
         place = (float(abscissa[index]), float(ordinate[index]))
         artists += ax.plot([place[0]], [place[1]], zorder=3, **marker(point.kind, color))
         if labels:
-            artists.append(_written(ax, point.name or point.label, place, color))
+            artists.append(_written(ax, point.name or point.label, place, color, below=point.name.startswith(_PARENT)))
     ax.set_xlabel(axis_label(x))
     ax.set_ylabel(axis_label(y))
     return artists
+
+
+def _part(x: Array, y: Array, pieces: list[Array] | None, segment: Segment) -> Array:
+    """(2, k) of the line over a segment."""
+    own = [] if pieces is None else pieces[segment.start : segment.stop - 1]
+    if not own:
+        return np.array([x[segment.start : segment.stop], y[segment.start : segment.stop]])
+    return np.concatenate([own[0], *(piece[:, 1:] for piece in own[1:])], axis=1)
 
 
 def _marked(branch: Branch, kinds: tuple[Kind, ...] | None) -> Iterator[tuple[int, SpecialPoint]]:
@@ -114,14 +133,14 @@ def _marked(branch: Branch, kinds: tuple[Kind, ...] | None) -> Iterator[tuple[in
             yield index, point
 
 
-def _written(ax: Any, text: str, place: tuple[float, float], color: str) -> Any:
-    """A label beside a point, with a white halo, so that it stays readable on a line."""
+def _written(ax: Any, text: str, place: tuple[float, float], color: str, below: bool = False) -> Any:
+    """A label beside a point, with a white halo, so that it stays readable on a line; below what its parent writes."""
     from matplotlib.patheffects import withStroke
 
     halo = [withStroke(linewidth=1.5, foreground="white")]
     return ax.annotate(
-        text, place, xytext=(4, 4), textcoords="offset points", fontsize="small", color=color, zorder=2.5,
-        path_effects=halo,
+        text, place, xytext=(4, -11 if below else 4), textcoords="offset points", fontsize="small", color=color,
+        zorder=2.5, path_effects=halo,
     )  # fmt: skip
 
 

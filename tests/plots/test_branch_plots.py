@@ -31,7 +31,54 @@ def test_styles_markers_and_labels(branch: st.Branch) -> None:
     assert LINES[st.Verdict.STABLE] == "solid" and mark.get_marker() == MARKERS[st.Kind.FOLD]
     assert text.get_text() == "LP1" and abs(mark.get_xdata()[0]) < 1e-12
     drawn = np.concatenate([stable.get_xdata(), unstable.get_xdata()[1:]])
+    assert np.isin(branch.parameter, drawn).all()  # smooth between the points, exact at each
+    stable, unstable, *_ = branch.plot(ax=ax, y="x", smooth=False)
+    drawn = np.concatenate([stable.get_xdata(), unstable.get_xdata()[1:]])
     np.testing.assert_array_equal(drawn, branch.parameter)
+
+
+def off(lines: list[object], curve: object) -> float:
+    """Largest distance of what is drawn, densely sampled, from curve(x, y) = 0 over its gradient's size."""
+    worst = 0.0
+    for drawn in lines:
+        x, y = (np.asarray(v) for v in drawn.get_data())  # type: ignore[attr-defined]
+        t = np.linspace(0, x.size - 1, 40 * x.size)
+        worst = max(worst, np.abs(curve(np.interp(t, range(x.size), x), np.interp(t, range(x.size), y))).max())  # type: ignore[operator]
+    return worst
+
+
+def test_lines_are_no_chords() -> None:
+    """An ellipse from 30 points: the line stays ten times nearer to it than its chords do, and inside its folds."""
+    x, a = sp.symbols("x a", real=True)
+    system = st.System(
+        name="ellipse", coordinates=("x",), states=("x",), parameters={"a": 0.0}, rhs=(x**2 + a**2 / 4 - 1,)
+    )
+    start = st.solve(st.Equilibrium(system), start=[-0.9], a=0.3)
+    closed = st.continuation(st.Equilibrium(system), "a", (-3.0, 3.0), start=start)
+    assert len(closed) < 50
+    ax = Figure().add_subplot()
+
+    def ellipse(a: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return (x**2 + a**2 / 4 - 1) / 2
+
+    smooth, chords = (
+        off(closed.plot(ax, y="x", smooth=s, labels=False)[: len(closed.segments())], ellipse) for s in (True, False)
+    )
+    assert smooth < 0.1 * chords
+    drawn = np.concatenate([part.get_xdata() for part in closed.plot(ax, y="x", labels=False)[:2]])
+    assert np.abs(drawn).max() < 2 + 1e-6
+
+
+def test_gaps_in_a_column_stay_gaps() -> None:
+    from stability.plots.curves import smooth_pieces
+
+    t = np.linspace(0, np.pi, 9)
+    y = np.sin(t)
+    y[4] = np.nan
+    pieces = smooth_pieces(t, y)
+    assert len(pieces) == 8 and [p.shape[1] for p in pieces[2:6]] == [2] * 4
+    assert np.isnan(pieces[3]).any() and np.isfinite(pieces[0]).all()
+    assert smooth_pieces(t[:2], t[:2])[0].shape == (2, 2)  # two points: nothing to bend
 
 
 def test_wrong_column(branch: st.Branch) -> None:
@@ -72,7 +119,7 @@ def test_multipliers_along_a_branch_and_at_its_special_points() -> None:
 def test_any_column_over_any_other_on_foreign_axes(branch: st.Branch) -> None:
     """The parabola a = x^2 drawn the other way round; its label names the stable part only."""
     ax = Figure().add_subplot()
-    lines = plot_branch(branch, ax, y="a", x="x", label="name", labels=False, color="#123456", kinds=())
+    lines = plot_branch(branch, ax, y="a", x="x", label="name", labels=False, color="#123456", kinds=(), smooth=False)
     assert [line.get_linestyle() for line in lines] == ["-", "--"] and {x.get_color() for x in lines} == {"#123456"}
     for line in lines:
         np.testing.assert_allclose(line.get_ydata(), line.get_xdata() ** 2, atol=1e-10)
