@@ -6,14 +6,23 @@ problems/harmonic_spectrum.py (`propagate`, `quotients`) state. Tuples of arrays
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
-from stability.kernels.addresses import call_field
+from stability.kernels.addresses import call_field, native_address
 from stability.kernels.caching import kernel
-from stability.kernels.condensation_newton import _condense
+from stability.kernels.condensation import condense
+from stability.kernels.condensation_newton import _CONDENSE, _condense
 from stability.kernels.harmonic_assembly import multiply, states
 
-__all__ = ["corrected", "missing", "propagate", "quotients"]
+__all__ = ["condenser", "corrected", "missing", "propagate", "quotients"]
+
+
+@functools.cache
+def condenser() -> int:
+    """Address of `condense` for `propagate`."""
+    return native_address(condense, _CONDENSE)
 
 
 @kernel(inline=True)

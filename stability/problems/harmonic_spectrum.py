@@ -29,10 +29,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..kernels.condensation_newton import solvers
 from ..kernels.fourier import series
 from ..kernels.gauss import gauss_rule
-from ..kernels.harmonic_stability import propagate, quotients
+from ..kernels.harmonic_stability import condenser, propagate, quotients
 from ..kernels.hill_matrix import hill_matrix, koopman_hill, mean_harmonics, selected
 from ..protocols import Spectrum
 from .harmonic_layout import slope_of
@@ -147,7 +146,7 @@ def _nodes(problem: HarmonicBalance) -> tuple[Any, ...]:
         points, coarse = _points(problem.harmonics, problem.multiple)
         coefficients = rule.inverse, rule.matrix, rule.row_sums, rule.update, rule.weights
         known = problem._memo["nodes"] = (
-            problem.evaluations.address("FJ"), points, coefficients, coarse, solvers()[0]
+            problem.evaluations.address("FJ"), points, coefficients, coarse, condenser()
         )
     return known  # type: ignore[no-any-return]
 
