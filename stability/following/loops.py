@@ -92,6 +92,9 @@ def collapsed(point: Point) -> str | None:
         return None  # close to a homoclinic orbit, which stands still for nearly all of its period
     mirror = getattr(point.problem, "mirror", None)
     solution = point.problem.view(point.u, point.params)
+    if isinstance(solution, FixedPoint) and mirror is not None:
+        gap = np.abs(mirror.symmetry.matrix @ point.u - point.u)
+        return "" if (gap <= _COLLAPSED * np.maximum(np.abs(point.u), point.problem.scales)).all() else None  # type: ignore[attr-defined]
     if not isinstance(solution, PeriodicOrbit):
         return None
     times = np.linspace(0.0, 0.5 * solution.period, 33)

@@ -19,7 +19,8 @@ from ..protocols import Seed
 from ..words import Kind
 from .collocation import Collocation
 from .defining import locate
-from .orbit_symmetry import Mirror, broken, on_half, turned
+from .equilibria import Equilibrium
+from .orbit_symmetry import Mirror, broken, on_half, turned, turned_equilibrium
 
 __all__ = ["breaks_symmetry", "pitchfork", "regained"]
 
@@ -31,13 +32,17 @@ def _crossing(point: Any) -> tuple[Mirror | None, Array, float]:
     from .switching import null_directions
 
     problem = point.problem
-    if not isinstance(problem, Collocation) or problem.halved or not problem.system.symmetries:
+    if not isinstance(problem, (Collocation, Equilibrium)) or getattr(problem, "halved", False):
+        return None, np.zeros(0), 0.0
+    if not problem.system.symmetries:
         return None, np.zeros(0), 0.0
     try:
         u, rate = null_directions(point)[1]
     except (InputError, np.linalg.LinAlgError):
         return None, np.zeros(0), 0.0
-    return turned(problem, np.array(point.u), u), u, rate
+    x = np.array(point.u)
+    lost = turned_equilibrium(problem, x, u) if isinstance(problem, Equilibrium) else turned(problem, x, u)
+    return lost, u, rate
 
 
 def breaks_symmetry(point: Any) -> bool:
@@ -56,7 +61,10 @@ def pitchfork(point: Any) -> Seed | None:
     if mirror is None:
         return None
     if not mirror.fraction:  # the same at every time: the discrete problem has the symmetry, too
-        problem = dataclasses.replace(point.problem, mirror=mirror, _memo={})
+        own: dict[str, Any] = {"_memo": {}}
+        if isinstance(point.problem, Equilibrium):
+            own = {"fresh": True} if point.problem.following else {}  # the new branch has its own scales
+        problem = dataclasses.replace(point.problem, mirror=mirror, **own)
         old = np.array(point.direction), float(point.rate)
         return Seed(problem, np.array(point.u), params, u, rate, 2, Kind.BRANCH_POINT, free, old, True)
     half, start = on_half(point.problem, np.array(point.u), mirror.symmetry)
@@ -67,7 +75,7 @@ def pitchfork(point: Any) -> Seed | None:
 
 
 def regained(
-    problem: Collocation, u: Array, params: Array, free: str, weight: float
+    problem: Any, u: Array, params: Array, free: str, weight: float
 ) -> tuple[Collocation, Array, Array, Array] | None:
     """(problem, u, direction, params) where a family without the symmetry gets it back, exactly; None: not found."""
     if not problem.mirror.fraction:

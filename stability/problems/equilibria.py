@@ -29,6 +29,7 @@ from ..protocols import Corrected, Critical, Seed, Spectrum, Tangent
 from ..results.solutions import FixedPoint
 from ..words import Kind
 from .equilibrium_linearisation import DenseLinearisation, eigenvalue_spectrum, equilibrated_solve
+from .orbit_symmetry import Mirror
 
 __all__ = ["Equilibrium"]
 
@@ -70,6 +71,7 @@ class Equilibrium:
     evaluations: Any = field(default=None, repr=False)
     following: bool = field(default=True, repr=False)
     fresh: bool = field(default=True, repr=False)
+    mirror: Any = field(default=None, repr=False)  # of a family that has lost a symmetry (`orbit_symmetry.Mirror`)
 
     def __post_init__(self) -> None:
         system = self.system
@@ -97,6 +99,7 @@ class Equilibrium:
         object.__setattr__(self, "scales", scales)
         object.__setattr__(self, "_index", {name: k for k, name in enumerate(system.parameters)})
         object.__setattr__(self, "_weights", 1.0 / scales**2)
+        object.__setattr__(self, "mirror", Mirror.of(self.mirror))
 
     # ------------------------------------------------------------------ what the driver reads
     @property
@@ -119,6 +122,7 @@ class Equilibrium:
         """Plain data; `from_spec` is the inverse."""
         spec: dict[str, Any] = {"problem": "Equilibrium", "scales": self.scales.tolist()}
         spec |= {"following": self.following, "fresh": self.fresh}
+        spec["mirror"] = None if self.mirror is None else self.mirror.plain
         if getattr(self.system, "function", None) is not None or not hasattr(self.system, "to_dict"):
             return {**spec, "view_only": True}
         return {**spec, "system": self.system.to_dict()}
@@ -129,7 +133,8 @@ class Equilibrium:
         from ..systems.system import System
 
         flags = {key: bool(spec[key]) for key in ("following", "fresh")}
-        return cls(System.from_dict(spec["system"]), np.array(spec["scales"], float), **flags)
+        mirror = spec.get("mirror")
+        return cls(System.from_dict(spec["system"]), np.array(spec["scales"], float), mirror=mirror, **flags)
 
     def index(self, name: str) -> int:
         """Position of a parameter."""
@@ -138,6 +143,15 @@ class Equilibrium:
     def seed(self) -> Seed | None:
         """None: an equilibrium branch starts from a solution."""
         return None
+
+    def image_problem(self) -> Equilibrium:
+        """The problem whose unknowns are the images S x of this one's, where there is a `mirror`."""
+        scales = np.abs(self.mirror.symmetry.matrix) @ self.scales
+        return dataclasses.replace(self, scales=scales)
+
+    def image(self, u: Array) -> Array:
+        """S u."""
+        return np.asarray(self.mirror.symmetry.matrix @ u)
 
     def linearise(self, u: Array, params: Array) -> DenseLinearisation:
         """f, f_x, f_p at (u, params)."""

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Mirror", "broken", "chosen", "invariances", "mirrored", "mirrored_problem", "on_half", "symmetric_doubled",
-    "turned",
+    "turned", "turned_equilibrium",
 ]  # fmt: skip
 
 Array = np.ndarray
@@ -158,6 +158,17 @@ def turned(problem: Collocation, u: Array, direction: Array) -> Mirror | None:
     for mirror in invariances(problem, u):
         if _gap(problem, direction / length, mirror, -1.0) < _ALONG:
             return mirror
+    return None
+
+
+def turned_equilibrium(problem: Any, u: Array, direction: Array) -> Mirror | None:
+    """The same for an equilibrium u (n,) and a direction: S u = u, S d = -d."""
+    size = float(np.abs(direction / problem.scales).max()) or 1.0
+    for symmetry in _usable(problem.system):
+        S = symmetry.matrix
+        still = np.abs((S @ u - u) / problem.scales).max() < _INVARIANT
+        if still and np.abs((S @ direction + direction) / problem.scales).max() < _ALONG * size:
+            return Mirror(symmetry, 0.0)
     return None
 
 

@@ -250,6 +250,22 @@ def test_pointwise_symmetry_lost_in_the_second_tongue():
     assert branch.columns["q.max"][: half - 1].max() > 0.1
 
 
+def test_a_circle_of_equilibria_closed_by_its_image():
+    """x' = (1 - r^2) x - x^3: pitchforks at r = -1 and 1, between them x = +-sqrt(1 - r^2)."""
+    x, r = sp.symbols("x r", real=True)
+    system = st.System(
+        name="circle", coordinates=("x",), states=("x",), parameters={"r": -2.0}, rhs=((1 - r**2) * x - x**3,)
+    )
+    rest = st.continuation(st.Equilibrium(system), "r", (-2.0, 2.0))
+    assert [p.symmetry_breaking for p in rest.special] == [True, True]
+    circle = st.continuation(st.switch(rest["BP1"]), "r", (-2.0, 2.0))
+    assert circle.statuses == (Status.CLOSED_LOOP,) * 2 and circle.labels == ("BP1", "BP2")
+    assert circle.columns["x"] ** 2 + circle.columns["r"] ** 2 == pytest.approx(1.0, abs=1e-9)
+    assert circle.columns["x"].max() == -circle.columns["x"].min() > 0.99
+    one, other = circle.at(r=0.3)
+    assert one["x"] == pytest.approx(-other["x"], abs=1e-12)
+
+
 # ---------------------------------------------------------------------- families
 def test_families_list_images_once():
     """x' = r x - x^3: x = 0 and +-sqrt r, one of them the image of the other."""

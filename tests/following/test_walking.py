@@ -51,7 +51,8 @@ def test_born_at_a_pitchfork() -> None:
     whole = st.continuation(st.switch(trivial["BP1"]), "a", (-1.0, 1.0))
     walk = st.steps(st.switch(trivial["BP1"]), "a", (-1.0, 1.0))
     signs = {float(np.sign(step.solution["x"])) for step in walk}
-    assert signs == {-1.0, 1.0}
+    assert len(signs) == 1  # one half is walked, the other is its image under x -> -x
+    assert set(np.sign(walk.branch.columns["x"])) >= {-1.0, 1.0}
     same(walk.branch, whole)
 
 
