@@ -218,7 +218,7 @@ def test_torus_points_at_one_scale():
 
 # ------------------------------------------------------------------ the pendulum in its own scaling
 def pendulum(e):
-    """u = U/eps, theta = O(eps), length_ratio = 2.5/eps^2, xi1 = 0.1 eps, xi2 = 0.25 eps, Omega0 = (1 - 2 eps)/2."""
+    """u = U/eps, theta = O(eps), length_ratio = 0.4/eps^2, xi1 = 0.1 eps, xi2 = 0.25 eps, Omega0 = (1 - 2 eps)/2."""
     return st.models.autoparametric_pendulum(
         xi1=0.1 * e, xi2=0.25 * e, length_ratio=0.4 / e**2, Omega0=(1 - 2 * e) / 2, mass_ratio_total=0.2
     )

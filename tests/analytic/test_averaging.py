@@ -312,7 +312,9 @@ def test_catalogue_models_average_by_their_own_orders(name):
 REFUSED = {
     "exp": (e * sp.exp(x), r"e\*exp\(x\)"),
     "fraction": (e / (1 + x), r"e/\(x \+ 1\)"),
+    "sine": (e * sp.sin(x), r"e\*sin\(x\)"),
     "max": (e * sp.Max(x, 0), r"Max\(0, x\)"),
+    "min": (e * sp.Min(x, 0), r"Min\(0, x\)"),
     "root": (e * sp.sqrt(1 + x**2), r"sqrt\(x\*\*2 \+ 1\)"),
     "modulus with forcing": (e * sp.Abs(x) * sp.cos(w * t), r"Abs\(x\)"),
     "square wave": (F * sp.sign(sp.cos(w * t)), r"sign"),
@@ -328,6 +330,25 @@ def test_terms_that_cannot_be_averaged_are_named(name):
     with pytest.raises(EquationError, match=pattern) as caught:
         st.averaging(system, small=("e", "F"))
     assert "HarmonicBalance" in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["sine", "exp", "fraction"])
+def test_smooth_functions_of_small_states_are_expanded(name):
+    """The same terms with x of order 1: the average over the fast phase, to the first power of x that is left out."""
+    term = {"sine": sp.sin(x), "exp": sp.exp(x) - 1, "fraction": x / (1 + x)}[name]
+    system = oscillator(e * term, e=0.3, F=0.0)
+    slow = st.averaging(system, small=dict(e=1, x=1, F=2))
+    errors = []
+    for size in (0.1, 0.05):
+        state = np.array([0.8, -0.6]) * size
+        errors.append(np.abs(slow(0.0, state) - by_quadrature(system, state)).max())
+    assert 0 < errors[0] < 0.3 * 0.1**3 and np.log2(errors[0] / errors[1]) == pytest.approx(3.0, abs=0.05)
+
+
+@pytest.mark.parametrize("rest", [e * sp.Min(x, 0), e * sp.Max(x, 0)])
+def test_kinks_are_refused_even_where_states_are_small(rest):
+    with pytest.raises(EquationError, match=r"M(in|ax).*HarmonicBalance"):
+        st.averaging(oscillator(rest), small=dict(e=1, x=1, F=2))
 
 
 def test_table_is_refused():
