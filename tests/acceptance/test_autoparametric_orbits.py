@@ -149,3 +149,50 @@ def test_amplitudes_of_the_doubled_branch_count_in_the_forcing_frequency():
     assert swing.columns["theta.amplitude(1/2)"][-1] == pytest.approx(spectrum[1, 1], rel=1e-8)
     assert swing.columns["u.amplitude(1)"][-1] == pytest.approx(spectrum[0, 2], rel=1e-8)
     assert swing.columns["theta.amplitude(1)"][-1] < 1e-9 and swing.columns["u.amplitude(1/2)"][-1] < 1e-9
+
+
+def monodromy_by_simulation(system, orbit, Omega):
+    """Multipliers of an orbit by scipy's DOP853 with the variational equations, over its whole period."""
+    from stability.systems.evaluators import evaluator
+
+    code, p, n = evaluator(system), system.parameter_vector(Omega=Omega), 4
+
+    def rhs(time, z):
+        F, J = code.FJ(np.array([time * Omega / (2 * np.pi)]), np.ascontiguousarray(z[None, :n]), p)
+        return np.concatenate([F[0], (J[0] @ z[n:].reshape(n, n)).ravel()])
+
+    z0 = np.concatenate([orbit(0.0), np.eye(n).ravel()])
+    end = solve_ivp(rhs, (0, orbit.period), z0, method="DOP853", rtol=1e-11, atol=1e-12).y[:, -1]
+    assert np.abs(end[:n] - orbit(orbit.period)).max() < 1e-6 * max(1.0, np.abs(orbit.multipliers).max())
+    return np.linalg.eigvals(end[n:].reshape(n, n))
+
+
+@pytest.mark.parametrize("base_term", [True, False])
+def test_torus_points_of_the_lightest_set_by_simulation(base_term):
+    """Sets (50, 0.1) and (100, 0.2) have none; here a pair of multipliers passes the unit circle between both sides."""
+    system = pendulum(10.0, 0.2, base_term)
+    semi = st.continuation(st.Collocation(system), "Omega", (0.5, 1.6))
+    swing = st.continuation(st.switch(semi["PD1"]), "Omega", (0.5, 1.6))
+    points = swing.of_kind(st.Kind.NEIMARK_SACKER)
+    assert len(points) == 2 and np.nanmax(np.abs(swing.values)) > 1e5  # on the way
+    for point in points:
+        here = point.params["Omega"]
+        critical = [m for m in point.multipliers if m.imag > 1e-6]
+        critical = min(critical, key=lambda m: abs(abs(m) - 1))
+        sides = []
+        for offset in (-1e-3, 1e-3):
+            orbits = swing.at(Omega=here + offset)
+            orbit = min(orbits, key=lambda o: np.abs(o.multipliers - critical).min())
+            values = monodromy_by_simulation(system, orbit, here + offset)
+            sides.append(abs(values[np.argmin(np.abs(values - critical))]) - 1)
+        assert sides[0] * sides[1] < 0 and max(map(abs, sides)) < 0.2
+
+
+@pytest.mark.parametrize(("length_ratio", "mass_ratio"), SETS[1:])
+def test_sets_without_torus_points(length_ratio, mass_ratio):
+    """Folds and symmetry breakings alone; where the semi-trivial motion is unstable the swing is stable."""
+    system = pendulum(length_ratio, mass_ratio)
+    semi = st.continuation(st.Collocation(system), "Omega", (0.5, 1.6))
+    swing = st.continuation(st.switch(semi["PD1"]), "Omega", (0.5, 1.6))
+    assert {p.kind for p in swing.special} == {st.Kind.FOLD, st.Kind.BRANCH_POINT}
+    assert "stable" in {str(o.verdict) for o in swing.at(Omega=1.0)}
