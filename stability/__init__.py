@@ -22,6 +22,7 @@ _EXPORTS: dict[str, str] = {
     "steps": "following.driver",
     "Walk": "following.walking",
     "Sensitivity": "results.sensitivity_table",
+    "sensitivity": "problems.measure_rates",
     "SpecialPoint": "results.special",
     "PeriodicOrbit": "results.solutions",
     "FixedPoint": "results.solutions",

@@ -45,6 +45,7 @@ __all__ = ["confirmed", "monitors"]
 
 Complex = NDArray[np.complex128]
 _STILL = 1e-4  # scaled rate of both parameters at a cusp
+_STILL_JUMP = 1e-2  # the same where the tangent is not known: folds of doubled orbits that shrink to the simple one
 _NOISE = 1e-9  # a scaled rate below this is rounding: the parameter is constant along the curve
 _ASIDE = 1e-3  # arclength to the neighbours that tell the sign of a second derivative
 
@@ -143,8 +144,12 @@ def _extreme(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
     """What it is where a parameter's rate vanishes."""
     if scale < 10 * _NOISE:
         return None
-    if abs(_first(point)) < _STILL and abs(_second(point)) < _STILL and curve.kind is Kind.FOLD:
+    first, second = abs(_first(point)), abs(_second(point))
+    jumps = (first if kind is Kind.FOLD else second) > 0.1 * scale  # a singular point: the family begins there
+    if curve.kind is Kind.FOLD and max(first, second) < (_STILL_JUMP if jumps else _STILL):
         return Kind.CUSP if kind is Kind.FOLD else None
+    if jumps:
+        return None
     if kind is Kind.FOLD or curve.kind is not Kind.FOLD:
         return kind
     sign = _hessian_sign(curve, point)

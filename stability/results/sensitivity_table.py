@@ -1,4 +1,4 @@
-"""How far a special point moves with every other parameter: frozen data, printed as a ranked table."""
+"""How far a special point, or a number told of a solution, moves with every parameter: frozen data, a ranked table."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ __all__ = ["Sensitivity"]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity:
-    """Derivatives of the place of a special point; what `SpecialPoint.sensitivity` returns.
+    """Derivatives of a special point's place or a solution's measure: of `SpecialPoint.sensitivity`, `sensitivity`.
 
     Attributes
     ----------
-    label, kind : of the point
-    name : str, the parameter lambda_1 in which its place is told;  value : float
+    label, kind : of the point; the name of the number told of an ordinary solution, whose kind is None
+    name : str, the parameter lambda_1 in which its place is told, or that number's;  value : float
     params : mapping of all parameter values there
     derivatives : mapping of name to d lambda_1 / d name, all other parameters fixed
     relative : mapping of name to (name / lambda_1) (d lambda_1 / d name): per cent for per cent, largest modulus first
@@ -28,7 +28,7 @@ class Sensitivity:
     """
 
     label: str
-    kind: Kind
+    kind: Kind | None
     name: str
     value: float
     params: Mapping[str, float]
@@ -53,7 +53,8 @@ class Sensitivity:
         return self.derivatives[name]
 
     def __repr__(self) -> str:
-        head = f"{self.label} {self.kind} at {self.name} = {self.value:.10g}"
+        what = f"{self.label} {self.kind} at" if self.kind is not None else "a solution with"
+        head = f"{what} {self.name} = {self.value:.10g}"
         width = max((len(k) for k in self.derivatives), default=4)
         rows = [f"  {'':{width}}  {'value':>12}  {'derivative':>13}  {'% per %':>10}"]
         for name, slope in self.derivatives.items():

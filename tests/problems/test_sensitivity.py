@@ -130,3 +130,89 @@ def test_requests_that_make_no_sense():
         branch["HB1"].sensitivity(of="sigm")
     with pytest.raises(UnknownNameError, match="this table"):
         branch["HB1"].sensitivity()["rho"]
+
+
+# ---------------------------------------------------------------------- tips of tongues
+def test_tip_of_a_tongue_against_differences():
+    """The largest length ratio that still makes the pendulum swing: by the envelope theorem, against tips of other curves."""
+
+    def tip(**params):
+        values = {"xi1": 0.02, "xi2": 0.01, "Omega0": 0.5, "length_ratio": 100.0, **params}
+        semi = st.continuation(st.Collocation(st.models.autoparametric_pendulum(**values)), "Omega", (0.8, 1.2))
+        window = (0.5 * values["length_ratio"], 1e5)
+        curve = st.continuation(st.locus(semi["PD1"], free="length_ratio", window=window), "Omega", (0.8, 1.2))
+        return max(curve.of_kind(Kind.EXTREMUM), key=lambda p: p.params["length_ratio"])
+
+    table = tip().sensitivity(of="length_ratio")
+    for name, value in (("xi2", 0.01), ("xi1", 0.02)):
+        wanted = difference(lambda v, name=name: tip(**{name: v}).params["length_ratio"], value, 2e-3 * value)
+        assert table[name] == pytest.approx(wanted, rel=1e-6)
+    assert abs(table["Omega"]) < 1e-6 * table.value
+
+
+# ---------------------------------------------------------------------- solutions
+@pytest.mark.parametrize("method", [st.Collocation, st.HarmonicBalance, st.Shooting], ids=lambda m: m.__name__)
+@pytest.mark.parametrize("of", ["u.max", "u_dot.min", "u.amplitude(1)"])
+def test_orbit_of_a_linear_oscillator_in_closed_form(method, of):
+    """u'' + 2 xi u' + u = W^2 cos(W t): u = Re A exp(i W t), A = W^2/(1 - W^2 + 2 i xi W)."""
+    xi, W = sp.symbols("xi W", positive=True)
+    A = W**2 / (1 - W**2 + 2 * sp.I * xi * W)
+    forms = {
+        "u.max": sp.sqrt(A * sp.conjugate(A)), "u_dot.min": -W * sp.sqrt(A * sp.conjugate(A)),
+        "u.amplitude(1)": sp.sqrt(A * sp.conjugate(A)),
+    }  # fmt: skip
+    options = {"harmonics": 3} if method is st.HarmonicBalance else {}
+    table = st.sensitivity(method(st.models.duffing(xi=0.1, beta=0.0), **options), of, Omega=1.3)
+    for name, symbol in (("xi", xi), ("Omega", W)):
+        exact = complex(sp.diff(forms[of], symbol).subs({xi: 0.1, W: 1.3}).evalf()).real
+        assert table[name] == pytest.approx(exact, rel=1e-7)
+
+
+@pytest.mark.parametrize("of", ["theta.max", "theta.amplitude(1/2)", "u_dot.max"])
+def test_swinging_pendulum_against_differences(of):
+    """An orbit of two forcing periods: rates of its amplitudes against differences of orbits solved separately."""
+    values = {"Omega": 0.97, "length_ratio": 1000.0, "Omega0": 0.48, "xi1": 0.002, "xi2": 0.005, "mass_ratio_total": 0.2}
+    semi = st.continuation(st.Collocation(st.models.autoparametric_pendulum()), "Omega", (0.94, 1.0))
+    swing = st.continuation(st.switch(semi["PD1"]), "Omega", (0.85, 1.1))
+    orbit = max(swing.at(Omega=0.97), key=lambda o: o.max["theta"])
+    problem = st.Collocation(st.models.autoparametric_pendulum(), multiple=2)
+    table = st.sensitivity(problem, of, start=orbit)
+    assert table.value == pytest.approx(orbit.max["theta"] if of == "theta.max" else table.value, rel=1e-8)
+
+    def measured(**params):
+        vector = problem.system.parameter_vector(**{**values, **params})
+        u = problem.start(vector, orbit)
+        found = problem.correct(u, vector, "Omega", None, 0.0, 1e-12)
+        return problem.measures(found.u, found.params)[of]
+
+    for name in ("xi2", "mass_ratio_total", "length_ratio", "Omega"):
+        step = 1e-4 * values[name] if name != "Omega" else 1e-5
+        wanted = difference(lambda v, name=name: measured(**{name: v}), values[name], step)
+        assert table[name] == pytest.approx(wanted, rel=1e-6)
+
+
+def test_equilibrium_and_period_in_closed_form():
+    """Lorenz: x^2 = b (rho - 1); the cycle of the quintic normal form: period 2 pi / w."""
+    table = st.sensitivity(st.Equilibrium(st.models.lorenz()), "x", start=dict(x=6, y=6, z=14), rho=15.0)
+    assert table["rho"] == pytest.approx(np.sqrt(8 / 3 / 14) / 2, rel=1e-9) and abs(table["sigma"]) < 1e-9
+    x, y, mu, w = sp.symbols("x y mu w", real=True)
+    growth = mu - x**2 - y**2
+    system = st.System(
+        name="cycle", coordinates=("x", "y"), states=("x", "y"), parameters={"mu": 0.25, "w": 1.5},
+        rhs=(growth * x - w * y, growth * y + w * x),
+    )  # fmt: skip
+    start = (lambda s: 0.5 * np.array([np.cos(1.5 * s), np.sin(1.5 * s)]), 2 * np.pi / 1.5)
+    assert st.sensitivity(st.Collocation(system), "period", start=start)["w"] == pytest.approx(-2 * np.pi / 1.5**2, rel=1e-9)
+    assert st.sensitivity(st.Collocation(system), "x.max", start=start)["mu"] == pytest.approx(1.0, rel=1e-7)
+
+
+def test_sensitivity_refuses_what_makes_no_sense():
+    problem = st.Collocation(st.models.duffing(xi=0.1))
+    with pytest.raises(InputError, match="say of what"):
+        st.sensitivity(problem)
+    with pytest.raises(UnknownNameError, match="did you mean"):
+        st.sensitivity(problem, "u.maxx")
+    with pytest.raises(UnknownNameError, match="xi"):
+        st.sensitivity(problem, "u.max", xii=0.2)
+    with pytest.raises(InputError, match="no reliable rate"):
+        st.sensitivity(problem, "u_absolute.max")

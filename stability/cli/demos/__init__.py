@@ -13,4 +13,4 @@ from __future__ import annotations
 
 __all__ = ["SECTIONS"]
 
-SECTIONS: tuple[str, ...] = ("tongues", "methods", "bifurcations")
+SECTIONS: tuple[str, ...] = ("tongues", "methods", "bifurcations", "plane")
