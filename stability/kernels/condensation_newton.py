@@ -184,76 +184,18 @@ def _columns(own, arc, free, h, sigma, span, F, Fp, dT, stage, node, columns, no
     return at_rhs
 
 
-@kernel(inline=True)
-def _unit(weights, weight_l, x):  # type: ignore[no-untyped-def]
-    """Divide x, with its parameter's entry, by its length."""
-    count = weights.shape[0]
-    length = np.sqrt(_norm(weights, x) ** 2 + (weight_l * x[count]) ** 2)
-    for k in range(count + 1):
-        x[k] /= length
-
-
-@kernel(inline=True)
-def _spectral(S, M, scales, spectral, hold):  # type: ignore[no-untyped-def]
-    """spectral (n, n) = D^-1 S M_{N-1} .. M_0 D, as S = S^-1; `hold` (n, n) is room for work."""
-    n = scales.shape[0]
-    for a in range(n):
-        for b in range(n):
-            spectral[a, b] = 0.0
-        spectral[a, a] = scales[a]
-    for j in range(M.shape[0] + 1):
-        for a in range(n):
-            for b in range(n):
-                value = 0.0
-                for c in range(n):
-                    value += (M[j, a, c] if j < M.shape[0] else S[a, c]) * spectral[c, b]
-                hold[a, b] = value
-        for a in range(n):
-            for b in range(n):
-                spectral[a, b] = hold[a, b] if j < M.shape[0] else hold[a, b] / scales[a]
-
-
-@kernel(inline=True)
-def _roughness(leading, h, scales, nodes, Y):  # type: ignore[no-untyped-def]
-    """Largest m-th derivative over m! of the scaled polynomials; `leading` are its coefficients (see `gauss`)."""
-    n, degree = scales.shape[0], leading.shape[0] - 1
-    largest = 0.0
-    for j in range(h.shape[0]):
-        power = h[j] ** degree
-        for a in range(n):
-            value = leading[0] * nodes[j, a]
-            for i in range(degree):
-                value += leading[i + 1] * Y[j, i * n + a]
-            largest = max(largest, abs(value) / (power * scales[a]))
-    return largest
-
-
-@kernel(inline=True)
-def _growth(b, h, J):  # type: ignore[no-untyped-def]
-    """int tr J ds by the Gauss weights b."""
-    degree, total = b.shape[0], 0.0
-    for j in range(h.shape[0]):
-        for i in range(degree):
-            trace = 0.0
-            for a in range(J.shape[1]):
-                trace += J[j * degree + i, a, a]
-            total += h[j] * b[i] * trace
-    return total
-
-
 @kernel
 def newton(  # type: ignore[no-untyped-def]
-    solvers, field, period, span, phase, h, W, A, row_sums, update, b, leading, kept, position, S, jump, scales,
-    weights, stage_weights,
+    solvers, field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales, weights,
+    stage_weights,
     P, free, u, nodes, Y, T, arc, t, t_Y, t_l, weight_l, ds, tolerance, max_iterations,
-    F, J, Fp, dT, LU, pivots, Z, M, spectral, facts,
+    F, J, Fp, dT, LU, pivots, Z, M,
 ):  # fmt: skip
     """Correct u = (nodes, Y, period) and P[free] in place; `arc` = 1 with a tangent (t, t_l), 0 without (P stays).
 
     nodes and Y are views of u, t_Y of t, stage_weights of weights. Returns (status, iterations, residual, sign, x):
-    x[0] is the last correction, x[1] the unit tangent of the curve (without `arc` the derivative by P[free]), both as
-    (u, parameter). F, J, Fp, dT, LU, pivots, Z, M hold the last linearisation; if converged, spectral (n, n) its
-    spectral matrix and facts (2,) the roughness of the solution and int tr J dt.
+    x[0] is the last correction, x[1] the tangent of the curve, not normalised (without `arc` the derivative by
+    P[free]), both as (u, parameter). F, J, Fp, dT, LU, pivots, Z, M hold the last linearisation.
     """
     intervals, size, n, count = Y.shape[0], Y.shape[1], nodes.shape[1], u.shape[0]
     own = 1 if period == 0 else 0
@@ -322,11 +264,6 @@ def newton(  # type: ignore[no-untyped-def]
         if arc == 1 and iterations > 1 and change > 2.0 * previous:
             break
         previous = change
-    if status == CONVERGED:
-        if arc == 1:
-            _unit(weights, weight_l, x[1])
-        _spectral(S, M, scales, spectral, np.empty((n, n)))
-        facts[0], facts[1] = _roughness(leading, h, scales, nodes, Y), sigma * _growth(b, h, J)
     return status, iterations, residual, sign, x
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from stability.kernels.caching import kernel
 from stability.kernels.elimination import back_substitute, eliminate
 
-__all__ = ["monodromy_product", "reduce_and_solve"]
+__all__ = ["monodromy_product", "reduce_and_solve", "summary"]
 
 LIMIT = 100.0  # largest entry of a product of neighbouring M_j: at most two digits are lost inside a group
 
@@ -61,10 +61,10 @@ def _gather(update, Z, X, nodes, rows, node_rows, corner):  # type: ignore[no-un
 
 
 @kernel(inline=True)
-def _group(M, Q, borders, reduced, ends, E, g):  # type: ignore[no-untyped-def]
+def _group(M, Q, borders, reduced, ends, G):  # type: ignore[no-untyped-def]
     """Multiply the M_j of neighbouring intervals as long as the product stays moderate.
 
-    Group i holds the nodes ends[i] .. ends[i+1]; E[i] (n, n), g[i] (n, K): u at its end = E u at its start + g z. The
+    Group i holds the nodes ends[i] .. ends[i+1]; G[i] = [E | g] (n, n + K): u at its end = E u at its start + g z. The
     border coefficients of its inner nodes are moved to its start. Returns the number of groups.
     """
     intervals, n, extra = Q.shape
@@ -73,39 +73,30 @@ def _group(M, Q, borders, reduced, ends, E, g):  # type: ignore[no-untyped-def]
     ends[0] = 0
     hold = np.empty((n, n + extra))
     for j in range(intervals):
-        largest = 0.0
-        if ends[count] == j:
-            for a in range(n):
-                for b in range(n):
-                    E[count, a, b] = M[j, a, b]
-                    largest = max(largest, abs(M[j, a, b]))
-                for k in range(extra):
-                    g[count, a, k] = Q[j, a, k]
-        else:
-            for r in range(q):
-                for c in range(n):
+        new = ends[count] == j
+        for a in range(n):
+            for b in range(n):
+                hold[a, b] = M[j, a, b] if new else 0.0
+            for k in range(extra):
+                hold[a, n + k] = Q[j, a, k]
+        if not new:
+            for c in range(n):
+                for a in range(n):
+                    factor = M[j, a, c]
+                    for k in range(n + extra):
+                        hold[a, k] += factor * G[count, c, k]
+                for r in range(q):
                     factor = borders[r, j, c]
                     for b in range(n):
-                        borders[r, ends[count], b] += factor * E[count, c, b]
+                        borders[r, ends[count], b] += factor * G[count, c, b]
                     for k in range(extra):
-                        reduced[r, k] -= factor * g[count, c, k]
-            for a in range(n):
-                for b in range(n):
-                    hold[a, b] = 0.0
-                for k in range(extra):
-                    hold[a, n + k] = Q[j, a, k]
-                for c in range(n):
-                    factor = M[j, a, c]
-                    for b in range(n):
-                        hold[a, b] += factor * E[count, c, b]
-                    for k in range(extra):
-                        hold[a, n + k] += factor * g[count, c, k]
-            for a in range(n):
-                for b in range(n):
-                    E[count, a, b] = hold[a, b]
-                    largest = max(largest, abs(hold[a, b]))
-                for k in range(extra):
-                    g[count, a, k] = hold[a, n + k]
+                        reduced[r, k] -= factor * G[count, c, n + k]
+        largest = 0.0
+        for a in range(n):
+            for k in range(n + extra):
+                G[count, a, k] = hold[a, k]
+                if k < n:
+                    largest = max(largest, abs(hold[a, k]))
         if largest > LIMIT or j == intervals - 1:
             count += 1
             ends[count] = j + 1
@@ -113,12 +104,13 @@ def _group(M, Q, borders, reduced, ends, E, g):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _chain(E, g, count, ends, borders, reduced, R):  # type: ignore[no-untyped-def]
+def _chain(G, count, ends, borders, reduced, R):  # type: ignore[no-untyped-def]
     """Eliminate the nodes between groups. R (count-1, n, 3n+K) receives the pivot rows [u_i | u_0 | u_{i+1} | z].
 
     Returns the last relation T[:n] = [coefficient of u_N | of u_0 | . | z] and the sign.
     """
-    n, extra = g.shape[1], g.shape[2]
+    n = G.shape[1]
+    extra = G.shape[2] - n
     q = borders.shape[0]
     width = 3 * n + extra
     T = np.empty((2 * n, width))
@@ -127,21 +119,21 @@ def _chain(E, g, count, ends, borders, reduced, R):  # type: ignore[no-untyped-d
     for a in range(n):
         for b in range(n):
             T[a, b] = 0.0
-            T[a, n + b] = -E[0, a, b]
+            T[a, n + b] = -G[0, a, b]
         T[a, a] = 1.0
         for k in range(extra):
-            T[a, 3 * n + k] = g[0, a, k]
+            T[a, 3 * n + k] = G[0, a, n + k]
     for i in range(1, count):
         here, after = ends[i], ends[i + 1]
         for a in range(n):
             for b in range(n):
-                T[n + a, b] = -E[i, a, b]
+                T[n + a, b] = -G[i, a, b]
                 T[n + a, n + b] = 0.0
                 T[n + a, 2 * n + b] = 0.0
                 T[a, 2 * n + b] = 0.0
             T[n + a, 2 * n + a] = 1.0
             for k in range(extra):
-                T[n + a, 3 * n + k] = g[i, a, k]
+                T[n + a, 3 * n + k] = G[i, a, n + k]
         one = eliminate(T, 2 * n, n, width, swaps)
         if one == 0.0:
             return T, 0.0
@@ -219,10 +211,10 @@ def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent
     q = corner.shape[0]
     sides = extra - q + tangent
     Q, borders, reduced = _gather(update, Z, X, nodes, rows, node_rows, corner)
-    ends, E, g = np.empty(intervals + 1, np.int64), np.empty((intervals, n, n)), np.empty((intervals, n, extra))
-    count = _group(M, Q, borders, reduced, ends, E, g)
+    ends, G = np.empty(intervals + 1, np.int64), np.empty((intervals, n, n + extra))
+    count = _group(M, Q, borders, reduced, ends, G)
     R = np.empty((max(count - 1, 1), n, 3 * n + extra))
-    T, sign = _chain(E, g, count, ends, borders, reduced, R)
+    T, sign = _chain(G, count, ends, borders, reduced, R)
     if sign == 0.0:
         return 0.0
     D, one = _dense(T, borders, reduced, S, nodes[intervals], tangent)
@@ -302,3 +294,24 @@ def monodromy_product(M):  # type: ignore[no-untyped-def]
             for b in range(n):
                 product[a, b] = work[a, b]
     return product
+
+
+@kernel
+def summary(M, J, h, b, leading, scales, nodes, Y):  # type: ignore[no-untyped-def]
+    """What a point of a branch is asked for: (M_{N-1} .. M_0, int tr J ds, roughness).
+
+    The integral by the Gauss weights b; the roughness is the largest m-th derivative over m! of the scaled polynomials,
+    whose coefficients are `leading` (see `gauss`).
+    """
+    n, degree = scales.shape[0], b.shape[0]
+    trace, rough = 0.0, 0.0
+    for j in range(h.shape[0]):
+        for i in range(degree):
+            for a in range(n):
+                trace += h[j] * b[i] * J[j * degree + i, a, a]
+        for a in range(n):
+            value = leading[0] * nodes[j, a]
+            for i in range(degree):
+                value += leading[i + 1] * Y[j, i * n + a]
+            rough = max(rough, abs(value) / (h[j] ** degree * scales[a]))
+    return monodromy_product(M), trace, rough

@@ -2,10 +2,10 @@
 
     T = [A | B]   ->   [L\\U | A^-1 B]
 
-Right-looking, four columns at a time; the multipliers stay below the diagonal and move with the row interchanges
-(LAPACK's convention). Matrices of a few rows are all loop overhead one by one; *lanes* T[:, :, q], q innermost, are
-eliminated together, each operation for all of them, in the processor's vector registers. Lanes interchange rows where
-a pivot of any is ten times smaller than the largest of its column (threshold pivoting).
+Right-looking; the multipliers stay below the diagonal and move with the row interchanges (LAPACK's convention).
+Matrices of a few rows are all loop overhead one by one; *lanes* T[:, :, q], q innermost, are eliminated together, each
+operation for all of them, in the processor's vector registers. Lanes interchange rows where a pivot of any is ten times
+smaller than the largest of its column (threshold pivoting).
 Reference: G. H. Golub, C. F. Van Loan (2013), Matrix Computations, 4th edition, sections 3.2 and 3.4.
 """
 
@@ -22,73 +22,45 @@ __all__ = ["back_substitute", "eliminate", "eliminate_lanes", "substitute_lanes"
 def eliminate(T, rows, size, width, swaps):  # type: ignore[no-untyped-def]
     """LU with row interchanges of the first `size` columns of T[:rows], applied to all `width` columns.
 
-    Right-looking, four columns at a time. Row interchanges move the multipliers, kept below the diagonal, too (LAPACK's
-    convention); `swaps` (size,) receives the pivot rows. Returns the sign of the product of the pivots and
-    interchanges, 0 where a pivot is zero or not finite.
+    `swaps` (size,) receives the pivot rows. Returns the sign of the product of the pivots and interchanges, 0 where a
+    pivot is zero or not finite.
     """
     sign = 1.0
-    for start in range(0, size, 4):
-        stop = min(start + 4, size)
-        for p in range(start, stop):
-            best, row = abs(T[p, p]), p
-            for i in range(p + 1, rows):
-                value = abs(T[i, p])
-                if value > best:
-                    best, row = value, i
-            swaps[p] = row
-            if not (best > 0.0 and best < np.inf):
-                return 0.0
-            if row != p:
-                sign = -sign
-                for k in range(width):
-                    T[p, k], T[row, k] = T[row, k], T[p, k]
-            if T[p, p] < 0.0:
-                sign = -sign
-            inverse = 1.0 / T[p, p]
-            for i in range(p + 1, rows):
-                factor = T[i, p] * inverse
-                T[i, p] = factor
-                for k in range(p + 1, stop):
-                    T[i, k] -= factor * T[p, k]
-        for p in range(start + 1, stop):
-            for i in range(start, p):
-                factor = T[p, i]
-                for k in range(stop, width):
-                    T[p, k] -= factor * T[i, k]
-        if stop == start + 4:
-            for i in range(stop, rows):
-                f, g, h, e = T[i, start], T[i, start + 1], T[i, start + 2], T[i, start + 3]
-                for k in range(stop, width):
-                    T[i, k] -= f * T[start, k] + g * T[start + 1, k] + h * T[start + 2, k] + e * T[start + 3, k]
-        else:
-            for p in range(start, stop):
-                for i in range(stop, rows):
-                    factor = T[i, p]
-                    for k in range(stop, width):
-                        T[i, k] -= factor * T[p, k]
+    for p in range(size):
+        best, row = abs(T[p, p]), p
+        for i in range(p + 1, rows):
+            value = abs(T[i, p])
+            if value > best:
+                best, row = value, i
+        swaps[p] = row
+        if not (best > 0.0 and best < np.inf):
+            return 0.0
+        if row != p:
+            sign = -sign
+            for k in range(width):
+                T[p, k], T[row, k] = T[row, k], T[p, k]
+        if T[p, p] < 0.0:
+            sign = -sign
+        inverse = 1.0 / T[p, p]
+        for i in range(p + 1, rows):
+            factor = T[i, p] * inverse
+            T[i, p] = factor
+            for k in range(p + 1, width):
+                T[i, k] -= factor * T[p, k]
     return sign
 
 
 @kernel(inline=True)
 def back_substitute(T, size, width):  # type: ignore[no-untyped-def]
-    """Solve with the upper triangle of T[:size, :size] for the columns size .. width, in place, four rows at a time."""
-    stop = size
-    while stop > 0:
-        start = max(stop - 4, 0)
-        for p in range(stop - 1, start - 1, -1):
-            inverse = 1.0 / T[p, p]
+    """Solve with the upper triangle of T[:size, :size] for the columns size .. width, in place."""
+    for p in range(size - 1, -1, -1):
+        inverse = 1.0 / T[p, p]
+        for k in range(size, width):
+            T[p, k] *= inverse
+        for i in range(p):
+            factor = T[i, p]
             for k in range(size, width):
-                T[p, k] *= inverse
-            for i in range(start, p):
-                factor = T[i, p]
-                for k in range(size, width):
-                    T[i, k] -= factor * T[p, k]
-        if stop - start == 4:
-            for i in range(start):
-                f, g, h, e = T[i, start], T[i, start + 1], T[i, start + 2], T[i, start + 3]
-                for k in range(size, width):
-                    T[i, k] -= f * T[start, k] + g * T[start + 1, k] + h * T[start + 2, k] + e * T[start + 3, k]
-        stop = start
+                T[i, k] -= factor * T[p, k]
 
 
 @kernel(inline=True)
@@ -132,40 +104,18 @@ def _interchange(T, p, size, width, lanes, swaps, hold):  # type: ignore[no-unty
 
 @kernel(inline=True)
 def eliminate_lanes(T, size, width, lanes, swaps, hold):  # type: ignore[no-untyped-def]
-    """`eliminate` of T[:, :, q] for every lane q (the innermost index, so that lanes are done together)."""
+    """LU of T[:, :size, q] for every lane q, applied to all columns; the sign of all determinants together."""
     sign = 1.0
-    for start in range(0, size, 4):
-        stop = min(start + 4, size)
-        for p in range(start, stop):
-            sign *= _interchange(T, p, size, width, lanes, swaps, hold)
-            if sign == 0.0:
-                return 0.0
-            for i in range(p + 1, size):
+    for p in range(size):
+        sign *= _interchange(T, p, size, width, lanes, swaps, hold)
+        if sign == 0.0:
+            return 0.0
+        for i in range(p + 1, size):
+            for q in range(lanes):
+                T[i, p, q] *= hold[q]
+            for k in range(p + 1, width):
                 for q in range(lanes):
-                    T[i, p, q] *= hold[q]
-                for k in range(p + 1, stop):
-                    for q in range(lanes):
-                        T[i, k, q] -= T[i, p, q] * T[p, k, q]
-        for p in range(start + 1, stop):
-            for i in range(start, p):
-                for k in range(stop, width):
-                    for q in range(lanes):
-                        T[p, k, q] -= T[p, i, q] * T[i, k, q]
-        if stop == start + 4:
-            a, b, c, d = start, start + 1, start + 2, start + 3
-            for i in range(stop, size):
-                for k in range(stop, width):
-                    for q in range(lanes):
-                        T[i, k, q] -= (
-                            T[i, a, q] * T[a, k, q] + T[i, b, q] * T[b, k, q]
-                            + T[i, c, q] * T[c, k, q] + T[i, d, q] * T[d, k, q]
-                        )  # fmt: skip
-        else:
-            for i in range(stop, size):
-                for p in range(start, stop):
-                    for k in range(stop, width):
-                        for q in range(lanes):
-                            T[i, k, q] -= T[i, p, q] * T[p, k, q]
+                    T[i, k, q] -= T[i, p, q] * T[p, k, q]
     return sign
 
 

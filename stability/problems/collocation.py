@@ -27,7 +27,6 @@ import numpy as np
 
 from ..errors import InputError
 from ..kernels import condensation_newton as kernels
-from ..kernels.condensation_reduced import monodromy_product
 from ..kernels.meshes import uniform_edges
 from ..protocols import Corrected, Spectrum, Tangent
 from ..systems.stops import refuse_stops
@@ -303,17 +302,19 @@ class Collocation(OrbitDiscretisation):
         rule = mesh.rule
         status, iterations, residual, sign, x = kernels.newton(
             kernels.solvers(), self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h,
-            rule.inverse, rule.matrix, rule.row_sums, rule.update, rule.weights, rule.leading, self.kept,
+            rule.inverse, rule.matrix, rule.row_sums, rule.update, self.kept,
             self.position, self.closure, self.winding, self.scales, weights, mesh.split(weights)[1], params, index, u,
             nodes, stages, work.T, arc, t, mesh.split(t)[1], t_l, weight, float(ds), float(tolerance),
             limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU, work.pivots, work.Z, work.M,
-            work.spectral, work.facts,
         )  # fmt: skip
         if status != kernels.CONVERGED:
             note = _NOTES.get(status) or self._not_finite(mesh, work)
             return Corrected(u, params, None, float(residual), iterations, 0, None, False, note)
-        work.complete = True
-        new = Tangent(x[1, : mesh.size], float(x[1, -1]) if arc else 1.0, weight if arc else 1.0)
+        direction = x[1, : mesh.size]
+        new = Tangent(direction, 1.0, 1.0)
+        if arc:
+            size = math.sqrt(float((weights * direction).dot(direction)) + (weight * float(x[1, -1])) ** 2)
+            new = Tangent(direction / size, float(x[1, -1]) / size, weight)
         linearisation: Any = work
         if mesh is self.mesh:
             correction = (x[0, : mesh.size], float(x[0, -1]) if arc else 0.0, index)
@@ -405,11 +406,7 @@ class Collocation(OrbitDiscretisation):
 
     def _growth_of_volume(self, linearisation: CollocationLinearisation) -> float:
         """int tr J dt over the span of the mesh, by the mesh's own Gauss quadrature."""
-        if linearisation.work.complete:
-            return float(linearisation.work.facts[1])
-        J, n = linearisation.work.J, self.mesh.n
-        mean = self.mesh.weights @ J.reshape(len(J), n * n)
-        return linearisation.sigma * float(mean[:: n + 1].sum())
+        return linearisation.sigma * linearisation.summary[1]
 
     @cached_property
     def orientation(self) -> float:
@@ -425,9 +422,8 @@ class Collocation(OrbitDiscretisation):
             return False
         return self.flow.divergence_free(linearisation.params)
 
-    def spectral_of(self, factors: Array) -> Array:
-        """M of the node relations M_j (N, n, n)."""
-        product = monodromy_product(factors)
+    def spectral_of(self, product: Array) -> Array:
+        """M of the fundamental matrix Phi."""
         if self.halved:
             product = self.closure @ product  # S^-1 = S
         return np.asarray(product * self.scales / self.scales[:, None])

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..kernels.condensation_reduced import monodromy_product
 from ..protocols import Tangent
 from .orbit_spectrum import deflated, eigenvalues, spectrum_distance
 
@@ -119,15 +120,14 @@ def multiplier_error(
     Where no multiplier is near the circle, the change at an earlier point of the same mesh is carried over, times
     3 and the square of the growth of the m-th derivative (up to 2): nodes have twice the order of the polynomial.
     """
-    work, solution = linearisation.work, linearisation.solution
-    roughness = float(work.facts[0]) if work.complete else _roughness(problem, solution)
+    solution, roughness = linearisation.solution, linearisation.summary[2]
     carried, _ = carried_errors(problem, solution, roughness)
     if min((abs(abs(z) - 1) for z in values.tolist()), default=1.0) > 1e3 * carried + 1e-5:
         return carried
     step = refined(problem, solution, linearisation.solution_params)
     if step is None:
         return math.inf
-    other = problem.spectral_of(step[2].M)
+    other = problem.spectral_of(monodromy_product(step[2].M))
     if direction is not None:
         other = deflated(other, direction)[0]
     error = spectrum_distance(values, eigenvalues(other))

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..kernels.condensation import solve_stages
-from ..kernels.condensation_reduced import monodromy_product, reduce_and_solve
+from ..kernels.condensation_reduced import reduce_and_solve, summary
 from ..kernels.condensation_sweeps import adjoint_sweep, forward_sweep
 from .orbit_mesh import OrbitMesh
 
@@ -35,12 +35,9 @@ Array = np.ndarray
 
 
 class Workspace:
-    """The arrays a kernel fills at one linearisation: field and derivatives at the stages, factors, node relations.
+    """The arrays a kernel fills at one linearisation: field and derivatives at the stages, factors, node relations."""
 
-    Where a Newton solve has left it (`complete`), the spectral matrix and the facts of kernels/condensation_newton.py.
-    """
-
-    __slots__ = ("F", "Fp", "J", "LU", "M", "T", "Z", "complete", "dT", "facts", "pivots", "spectral")
+    __slots__ = ("F", "Fp", "J", "LU", "M", "T", "Z", "dT", "pivots")
 
     def __init__(self, mesh: OrbitMesh, m: int, kept: int) -> None:
         count, N, n = mesh.intervals * mesh.degree, mesh.intervals, mesh.n
@@ -49,7 +46,6 @@ class Workspace:
         self.T, self.dT = np.zeros(1), np.zeros(m)
         self.LU, self.pivots = np.empty((N, size, size)), np.empty((N, size), np.int64)
         self.Z, self.M = np.empty((N, mesh.degree * n, n)), np.empty((N, n, n))
-        self.spectral, self.facts, self.complete = np.empty((n, n)), np.empty(2), False
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,12 +183,22 @@ class CollocationLinearisation:
     @cached_property
     def fundamental(self) -> Array:
         """Phi (n, n) of the span, in the states' own units."""
-        return np.asarray(monodromy_product(self.work.M))
+        return self.summary[0]
+
+    @cached_property
+    def summary(self) -> tuple[Array, float, float]:
+        """Phi, int tr J ds, roughness of the solution: the largest m-th derivative over m! of its scaled polynomials."""
+        mesh, work = self.mesh, self.work
+        nodes, stages, _ = mesh.split(self.solution)
+        product, trace, roughness = summary(
+            work.M, work.J, mesh.h, mesh.rule.weights, mesh.rule.leading, self.problem.scales, nodes, stages
+        )
+        return product, float(trace), float(roughness)
 
     @cached_property
     def spectral(self) -> Array:
         """M = D^-1 S^-1 Phi D."""
-        return self.work.spectral if self.work.complete else self.problem.spectral_of(self.work.M)
+        return self.problem.spectral_of(self.summary[0])
 
     def _variation(self, start: Array, tau: float, free: int, amount: float) -> tuple[Array, Array]:
         """Nodes (N + 1, n), stages (N, mn) of the variation with dx(0) = start, dT = tau, dp_free = amount."""
