@@ -29,9 +29,15 @@ _TRANSIENTS = 400  # periods of a forced system
 
 
 def from_function(problem: OrbitDiscretisation, function: Callable[[Array], Array], period: float) -> Array:
-    """u of x = function(t) -> (n, K) with the given orbit period."""
-    length = period * (0.5 if problem.halved else 1.0)
-    return problem.packed(np.asarray(function(problem.places * length), float).T, period)
+    """u of x = function(t) -> (n, K) with the given orbit period.
+
+    Half of a period gets the symmetric part of the function, (x(t) + S (x(t + P/2) - w)) / 2.
+    """
+    if not problem.halved:
+        return problem.packed(np.asarray(function(problem.places * period), float).T, period)
+    times = problem.places * (0.5 * period)
+    first, second = (np.asarray(function(t), float).T for t in (times, times + 0.5 * period))
+    return problem.packed(0.5 * (first + (second - problem.winding) @ problem.closure.T), period)
 
 
 def discretised(problem: OrbitDiscretisation, times: Array, states: Array, period: float) -> Array:

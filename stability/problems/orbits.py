@@ -64,6 +64,7 @@ class OrbitDiscretisation:
     symmetry: Any = None
     mirror: Any = None  # how a family that has lost a symmetry is mapped to its image (see `orbit_symmetry.Mirror`)
     if TYPE_CHECKING:  # what the two add
+        closure: Any
         correct: Any
         linearise: Any
         spectrum: Any

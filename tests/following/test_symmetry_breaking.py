@@ -207,6 +207,48 @@ def test_a_parameter_that_breaks_the_symmetry_has_no_sensitivity():
     assert fold.sensitivity().breaking == ("gravity",)
 
 
+# ---------------------------------------------------------------------- other sorts of systems
+def test_symmetric_cycles_of_lorenz():
+    """x(t + T/2) = (-x, -y, z) at rho = 350, lost at 313 (Sparrow 1982, chapter 4), then a doubling at 229.4."""
+    system = st.models.lorenz(rho=350.0)
+    start = st.simulate(system, (0, 30), x0=dict(x=1.0, y=2.0, z=300.0), rtol=1e-9, atol=1e-9)(30.0)
+    branches = []
+    for symmetry in (None, "auto"):
+        problem = st.Collocation(system, symmetry=symmetry, accuracy=1e-11)
+        branch = st.continuation(problem, "rho", (350.0, 250.0), start=dict(zip(system.states, start)))
+        assert branch.labels == ("BP1",) and branch["BP1"].symmetry_breaking
+        branches.append(branch)
+    whole, half = branches
+    assert half["BP1"].params["rho"] == pytest.approx(whole["BP1"].params["rho"], abs=1e-8)
+    assert half["BP1"].params["rho"] == pytest.approx(312.97, abs=0.01)
+    assert half.solution(0).period == pytest.approx(whole.solution(0).period, rel=1e-10)
+    born = st.continuation(st.switch(half["BP1"]), "rho", (350.0, 220.0))
+    assert born.labels == ("PD1", "BP1", "PD2")
+    assert born["PD1"].params["rho"] == born["PD2"].params["rho"] == pytest.approx(229.4, abs=0.05)
+
+
+def test_a_force_that_jumps():
+    """x'' + x'/5 + x + x^3 = 20 sign cos(Omega t); what is started symmetric stays so, where others attract, too."""
+    t, Omega, F = sp.symbols("t Omega F", real=True)
+    x = sp.Function("x")(t)
+    system = st.System.from_equations(
+        {x.diff(t, 2): -x.diff(t) / 5 - x - x**3 + F * sp.sign(sp.cos(Omega * t))}, coordinates=[x],
+        parameters={"F": 20.0, "Omega": 2.0}, period=2 * sp.pi / Omega, breaks=(sp.Rational(1, 4), sp.Rational(3, 4)),
+    )  # fmt: skip
+    whole = st.continuation(st.Collocation(system, accuracy=1e-11), "Omega", (0.62, 2.0))
+    half = st.continuation(st.Collocation(system, accuracy=1e-11, symmetry="auto"), "Omega", (0.62, 2.0))
+    assert whole.labels == half.labels and "BP2" in half.labels
+    for p, q in zip(whole.special, half.special):
+        assert q.params["Omega"] == pytest.approx(p.params["Omega"], abs=1e-9)
+    born = st.continuation(st.switch(half["BP1"]), "Omega", (0.62, 2.0))
+    residuals = [born._problem(i).linearise(born.unknowns[i], born._vector(i)).residual for i in range(len(born))]
+    assert max(np.abs(r).max() for r in residuals) < 1e-6
+    coexisting = st.solve(st.Collocation(system), start=born.at(Omega=0.64)[0], Omega=0.64)
+    assert coexisting.max["x"] + coexisting.min["x"] != pytest.approx(0.0, abs=1e-3)
+    back = st.solve(st.Collocation(system, symmetry="auto"), start=coexisting, Omega=0.64)
+    assert back.max["x"] == pytest.approx(-back.min["x"], abs=1e-9)
+
+
 # ---------------------------------------------------------------------- the pendulum
 def test_swinging_branch_of_the_pendulum_on_one_forcing_period():
     """theta(t + T) = -theta(t): by "auto" the doubled branch is solved on T; labels and places as on 2T."""
