@@ -109,6 +109,8 @@ def checked(
     names = list(problem.parameters)
     if name not in names:
         raise unknown_name("parameter", name, names, "this problem")
+    if hasattr(problem, "check_free"):
+        problem.check_free(name)  # a parameter that breaks the symmetry of orbits solved on half of their period
     try:
         first, last = (float(v) for v in window)
     except (TypeError, ValueError):

@@ -284,7 +284,6 @@ class Collocation(OrbitDiscretisation):
         self, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
     ) -> Corrected:
         """The bordered Newton solve of `protocols.Problem`, in one compiled call."""
-        self.check_free(free)
         return self.newton(self.mesh, u, params, self.index(free), tangent, ds, tolerance, None)
 
     def newton(

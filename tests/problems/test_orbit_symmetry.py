@@ -55,6 +55,22 @@ def test_parameters_that_break_the_symmetry_are_refused():
         st.locus(fold, free="gravity")
 
 
+def test_the_first_parameter_may_be_one_that_breaks_the_symmetry():
+    """x'' + x'/5 + x + x^3 = cos(Omega t) + bias with bias = 0 in front."""
+    x, bias = sp.Function("x")(t), sp.Symbol("bias", real=True)
+    system = st.System.from_equations(
+        {x.diff(t, 2): -x.diff(t) / 5 - x - x**3 + sp.cos(Omega * t) + bias}, coordinates=[x],
+        parameters={"bias": 0.0, "Omega": 1.2}, period=2 * sp.pi / Omega,
+    )  # fmt: skip
+    problem = st.Collocation(system, symmetry="auto")
+    assert problem.symmetry.fixed == ("bias",)
+    orbit, whole = st.solve(problem), st.solve(st.Collocation(system))
+    assert orbit.max["x"] == pytest.approx(whole.max["x"], abs=1e-9)
+    assert len(st.continuation(problem, "Omega", (1.2, 1.5))) > 3
+    with pytest.raises(InputError, match="'bias' breaks"):
+        st.continuation(problem, "bias", (0.0, 0.1))
+
+
 def test_auto_takes_what_there_is():
     half = st.Collocation(st.models.duffing_textbook(), symmetry="auto")
     assert half.halved and half.symmetry in half.system.symmetries and half.intervals == 10
