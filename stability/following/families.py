@@ -19,6 +19,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import chain
@@ -27,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, InputError, check_names
+from ..errors import ConvergenceError, InputError, OpenResonanceWarning, check_names
 from ..protocols import Problem
 from ..results.branch import Branch
 from .driver import continuation
@@ -107,29 +108,10 @@ def families(
     check_names("parameter", through or {}, list(problem.parameters), "this problem")
     if name in (through or {}):
         raise InputError(f"through = {name!r} is the continued parameter itself: give another one, a forcing amplitude")
-    first, last = (float(v) for v in window)
     search = _Search(problem, name, _mirrors(problem, name) if merge else ())
-    found: list[Branch] = []
-    trouble: ConvergenceError | None = None
-    for ends in ((first, last), (last, first)):
-        try:
-            if found and not search.is_new(ends[0], options.get("start"), found):
-                continue
-            found.append(continuation(problem, name, ends, **options))
-        except ConvergenceError as error:
-            trouble = error
-    searchable = not getattr(problem, "own", 0)
-    for k in range(places if searchable else 0):
-        value = first + (last - first) * (k + 0.5) / places
-        across = (search.across(value, found, *item, options) for item in (through or {}).items())
-        for solution in chain(search.solutions(value, found, sizes), *across):
-            try:
-                found.append(continuation(problem, name, (first, last), **{**options, "start": solution}))
-            except ConvergenceError as error:
-                trouble = error
-    if not found:
-        raise trouble or ConvergenceError("no solution was found anywhere in the window; give start=")
-    return tuple(found)
+    with warnings.catch_warnings():  # what an open resonance is advised to do is done here
+        warnings.simplefilter("ignore", OpenResonanceWarning)
+        return search.run(window, places, sizes, through or {}, options)
 
 
 # ---------------------------------------------------------------------- what is known
@@ -164,6 +146,34 @@ class _Search:
     problem: Any
     name: str
     mirrors: tuple[Any, ...]
+
+    def run(
+        self, window: tuple[float, float], places: int, sizes: tuple[float, ...],
+        through: Mapping[str, tuple[float, float]], options: dict[str, Any],
+    ) -> tuple[Branch, ...]:  # fmt: skip
+        """All branches found; see `families`."""
+        first, last = (float(v) for v in window)
+        found: list[Branch] = []
+        trouble: ConvergenceError | None = None
+        for ends in ((first, last), (last, first)):
+            try:
+                if found and not self.is_new(ends[0], options.get("start"), found):
+                    continue
+                found.append(continuation(self.problem, self.name, ends, **options))
+            except ConvergenceError as error:
+                trouble = error
+        searchable = not getattr(self.problem, "own", 0)
+        for k in range(places if searchable else 0):
+            value = first + (last - first) * (k + 0.5) / places
+            across = (self.across(value, found, *item, options) for item in through.items())
+            for solution in chain(self.solutions(value, found, sizes), *across):
+                try:
+                    found.append(continuation(self.problem, self.name, (first, last), **{**options, "start": solution}))
+                except ConvergenceError as error:
+                    trouble = error
+        if not found:
+            raise trouble or ConvergenceError("no solution was found anywhere in the window; give start=")
+        return tuple(found)
 
     def params_at(self, value: float) -> Array:
         params = np.array(list(self.problem.parameters.values()), dtype=float)

@@ -34,6 +34,7 @@ from ..kernels.gauss import gauss_rule
 from ..kernels.harmonic_stability import condenser, propagate, quotients
 from ..kernels.hill_matrix import hill_matrix, koopman_hill, mean_harmonics, selected
 from ..protocols import Spectrum
+from ..words import Verdict
 from .harmonic_layout import slope_of
 from .harmonic_truncation import Correction
 from .orbit_spectrum import deflated, eigenvalues, orbit_spectrum, spectrum_distance
@@ -246,7 +247,7 @@ def checked_spectrum(L: HarmonicLinearisation) -> Spectrum:
         if refined is not None:
             others, values, bound = refined
             error = 2 * spectrum_distance(values, others) + bound + _floor(along) + (_drift(L, along) if own else 0.0)
-            return orbit_spectrum(_ordered(values), error)
+            return _judged(_ordered(values), error)
     values = _whole_values(L)
     if along is None or not np.isfinite(values).all():
         return orbit_spectrum(values, np.inf)
@@ -256,7 +257,15 @@ def checked_spectrum(L: HarmonicLinearisation) -> Spectrum:
         error += drift
     others = eigenvalues(M)
     error += 2 * max(spectrum_distance(values, others), spectrum_distance(others, values))
-    return orbit_spectrum(_with_small_ones(values, others), error)
+    return _judged(_with_small_ones(values, others), error)
+
+
+def _judged(values: Array, error: float) -> Spectrum:
+    """Counts and verdict; the error of a multiplier outside the circle is relative, and must leave it outside."""
+    found = orbit_spectrum(values, error)
+    if found.verdict is Verdict.UNSTABLE and not float(np.abs(values).max()) * (1.0 - error) > 1.0:
+        return found._replace(verdict=Verdict.UNDETERMINED)
+    return found
 
 
 def _drift(L: HarmonicLinearisation, along: Propagation) -> float:

@@ -128,6 +128,18 @@ def test_the_backbone_runs_through_the_phase_resonance_of_a_response():
     assert abs(2 * np.pi / orbit.period - response.parameter[peak]) < 2e-3
 
 
+def test_a_backbone_is_drawn_over_a_response():
+    """By the forcing frequency's column: the lines are those numbers."""
+    from matplotlib.figure import Figure
+
+    duffing = st.models.duffing(xi=0.02, beta=0.001)
+    ax, curve = Figure().subplots(), st.continuation(st.Backbone(duffing), "amplitude", (0.01, 30))
+    st.continuation(st.HarmonicBalance(duffing, harmonics=5), "Omega", (0.5, 2.0)).plot(ax=ax, y="u.amplitude(1)")
+    (line,) = curve.plot(ax=ax, x="Omega", y="u.amplitude(1)", smooth=False)
+    assert np.array_equal(line.get_xdata(), curve.columns["omega"])
+    assert np.array_equal(line.get_ydata(), curve.columns["u.amplitude(1)"])
+
+
 def test_a_loaded_backbone_goes_on(tmp_path):
     curve = st.continuation(st.Backbone(st.models.duffing(beta=0.1)), "amplitude", (0.1, 2.0))
     curve.save(tmp_path / "b.npz")
