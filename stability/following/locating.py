@@ -261,7 +261,8 @@ class Locator:
         if tangent is None:
             return None
         tests = smooth_tests(spectrum.values, problem.critical.circle)
-        residual = float(np.max(np.abs(L.residual)))
+        scaled = getattr(L, "size_of_residual", None)
+        residual = float(np.max(np.abs(L.residual))) if scaled is None else float(scaled)
         s = a.s + min(1.0, max(0.0, where)) * (b.s - a.s)
         parameter = float(located.params[self.k])
         return Point(

@@ -272,12 +272,27 @@ class Equilibrium:
                 found = problem.correct(candidate, params, free, None, 0.0, 1e-9) if free else None
                 if found is not None and found.converged and np.isfinite(found.u).all():
                     return found.u
+        if guess is not None and self._is_singular_solution(x, params):
+            where = dict(zip(self.system.states, x.tolist()))
+            raise ConvergenceError(
+                f"start {where} is an equilibrium of '{self.system.name}', but its Jacobian is singular "
+                "(a fold or a branch point): begin at another parameter value, a little beside it", last=x,
+            )
         origin = "the default start" if guess is None else "start"
         raise ConvergenceError(
             f"no equilibrium of '{self.system.name}' was found from {origin}; give start={{state: value, ...}} nearer "
             "to a solution, for example the end of a simulation",
             last=x,
         )
+
+    def _is_singular_solution(self, x: Array, params: Array) -> bool:
+        """Whether f(x) is zero but for rounding, and df/dx has no inverse."""
+        F, J = (a[0] for a in self.evaluations.FJ(_NO_PHASE, x[None, :], params))
+        if not (np.isfinite(F).all() and np.isfinite(J).all()):
+            return False
+        least = float(np.linalg.svd(J * self.scales / self.scales[:, None], compute_uv=False)[-1])
+        sizes = np.abs(J) @ (np.abs(x) + self.scales)
+        return bool((np.abs(F) <= 1e-9 * (sizes + 1e-300) + 1e-15).all()) and least < 1e-7
 
     def _relaxed(self, x: Array, params: Array) -> Array | None:
         """Implicit Euler steps in pseudo-time whose length grows as |f| falls: ends at a stable equilibrium, if any."""

@@ -64,6 +64,12 @@ class DenseLinearisation:
         """f(x, p), (n,)."""
         return self.F
 
+    @property
+    def size_of_residual(self) -> float:
+        """Largest residual over the size of the terms of its equation."""
+        terms = np.abs(self.J) @ (np.abs(self.u) + self.problem.scales) + 1e-300
+        return float(np.max(np.abs(self.F) / terms))
+
     @cached_property
     def spectral(self) -> Array:
         """D^-1 f_x D, (n, n)."""

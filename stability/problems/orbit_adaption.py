@@ -7,14 +7,15 @@ The error of the nodes goes like N^(-2m); the wanted `accuracy` gives the number
 limited to a factor between 2/3 and 2, with a dead band so that the mesh rests while the error is between 1e-5 and 1
 times the accuracy. Errors that are rounding, N eps |core^-1|, are left alone: an undamped orbit far up a resonance is
 known to few digits, and no mesh gives it more. The intervals are placed by equidistribution (kernels/meshes.py) when
-the error per interval is uneven. Scales are the largest moduli of the states on the orbit, kept within a factor of 2 of them; those of an angle
-do not fall below a small part of a radian, so that a branch that is born where a pendulum hangs still leaves at once.
+the error per interval is uneven. Scales are the largest moduli of the states on the orbit, kept within a factor of 2 of
+them; those of an angle do not fall below a small part of a radian, so that a branch that is born where a pendulum hangs
+still leaves at once.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -36,26 +37,41 @@ _LOST = 30.0  # errors below so many times their rounding do not ask for more in
 _ANGLE = 0.02  # rad
 
 
-def natural_sizes(system: System, period: float) -> Array:
-    """(n,) smallest sensible scales: a small angle, and the velocity of swinging by it once a period; 0 elsewhere."""
-    sizes = np.zeros(system.n)
+class Natural(NamedTuple):
+    """What a system says of the sizes of its states: smallest sensible scales (n,), units to compare them in (n,)."""
+
+    smallest: Array | float = 0.0
+    units: Array | float = 1.0
+
+
+def natural_sizes(system: System, period: float) -> Natural:
+    """Smallest scales: a small angle, and the velocity of swinging by it once a period; 0 elsewhere.
+
+    A velocity counts in 2 pi / period of its coordinate, whatever the unit of time.
+    """
+    sizes, units = np.zeros(system.n), np.ones(system.n)
+    if np.isfinite(period) and period > 0:
+        for name in system.coordinates:
+            if f"{name}_dot" in system.states:
+                units[system.states.index(f"{name}_dot")] = 2 * np.pi / period
     for angle in system.angles:
         for name, size in ((angle, _ANGLE), (f"{angle}_dot", 2 * np.pi * _ANGLE / period)):
             if name in system.states and np.isfinite(size):
                 sizes[system.states.index(name)] = size
-    return sizes
+    return Natural(sizes, units)
 
 
-def state_scales(values: Array, smallest: Array | float = 0.0) -> Array:
-    """(n,) largest moduli of values (K, n), not below `smallest` (see `natural_sizes`).
+def state_scales(values: Array, natural: Natural = Natural()) -> Array:  # noqa: B008 - a constant
+    """(n,) largest moduli of values (K, n), not below the smallest sensible ones (see `natural_sizes`).
 
-    A state that is (nearly) zero takes the largest scale of all, at most 1.
+    A state that is (nearly) zero, compared with the others in their units, takes the largest scale of all, at most 1.
     """
     size = np.abs(values).max(axis=0)
-    largest = float(size.max())
+    largest = float((size / natural.units).max())
     if not np.isfinite(largest) or largest == 0.0:
         return np.ones(len(size))
-    return np.where(size > _TINY * largest, np.maximum(size, smallest), min(largest, 1.0))
+    alive = size > _TINY * largest * natural.units
+    return np.where(alive, np.maximum(size, natural.smallest), min(largest, 1.0) * natural.units)
 
 
 def adapted(
