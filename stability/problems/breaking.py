@@ -42,6 +42,9 @@ def _crossing(point: Any) -> tuple[Mirror | None, Array, float]:
         return None, np.zeros(0), 0.0
     x = np.array(point.u)
     lost = turned_equilibrium(problem, x, u) if isinstance(problem, Equilibrium) else turned(problem, x, u)
+    for name in () if lost is None else lost.symmetry.fixed:  # the symmetry holds at the system's own value only
+        if name == point.free or point.params[name] != problem.system.parameters[name]:
+            return None, u, rate
     return lost, u, rate
 
 

@@ -308,6 +308,21 @@ def test_a_circle_of_equilibria_closed_by_its_image():
     assert one["x"] == pytest.approx(-other["x"], abs=1e-12)
 
 
+def test_a_symmetry_that_the_parameter_destroys_makes_no_images():
+    """x' = (r + h) x - x^3 + h x^2 is odd at h = 0 only: along h the crossing at h = 1 has two different halves."""
+    x, r, h = sp.symbols("x r h", real=True)
+    system = st.System(
+        name="bent", coordinates=("x",), states=("x",), parameters={"r": -1.0, "h": 0.0},
+        rhs=((r + h) * x - x**3 + h * x**2,),
+    )  # fmt: skip
+    assert [s.fixed for s in system.symmetries] == [("h",)]
+    crossing = st.continuation(st.Equilibrium(system), "h", (0.0, 2.0))["BP1"]
+    assert not crossing.symmetry_breaking
+    branch = st.continuation(st.switch(crossing), "h", (0.0, 2.0))
+    ends = sorted(branch.columns["x"][[0, -1]])
+    assert ends == pytest.approx([1 - np.sqrt(2), 1 + np.sqrt(2)], abs=1e-9)
+
+
 # ---------------------------------------------------------------------- families
 def test_families_list_images_once():
     """x' = r x - x^3: x = 0 and +-sqrt r, one of them the image of the other."""
