@@ -157,3 +157,11 @@ def test_refusals():
     one_way = {x.diff(t, 2): -x - y - e * x**3, y.diff(t, 2): -y + e * sp.cos(w * t)}
     with pytest.raises(EquationError, match="differ"):
         st.averaging(st.System.from_equations(one_way, [x, y], parameters=dict(e=0.1, w=1.0), orders=dict(e=1)))
+
+
+@pytest.mark.parametrize("term", [sp.Abs(x) * x, sp.sign(x.diff(t)), sp.Max(x, 0), sp.exp(x)])
+def test_terms_that_mix_modes_and_are_no_polynomials_are_refused_by_name(term):
+    rows = {x.diff(t, 2): -2 * x + y - e * term, y.diff(t, 2): -2 * y + x + e * sp.cos(w * t)}
+    system = st.System.from_equations(rows, [x, y], parameters=dict(e=0.1, w=1.0), orders=dict(e=1))
+    with pytest.raises(EquationError, match=r"(Abs|sign|Max|exp)\(.*HarmonicBalance"):
+        st.averaging(system)
