@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from stability.kernels.caching import kernel
-from stability.kernels.runge_kutta import DONE, integrate
+from stability.kernels.runge_kutta import DONE, advance
 
 __all__ = ["ESCAPED", "UNDECIDED", "assign"]
 
@@ -24,7 +24,7 @@ def _near(z, points, owners, scale, wraps, tolerance):  # type: ignore[no-untype
     for k in range(points.shape[0]):
         inside = True
         for a in range(z.shape[0]):
-            gap = z[a, 0] - points[k, a]
+            gap = z[a] - points[k, a]
             if wraps[a]:
                 gap -= 2.0 * np.pi * np.round(gap / (2.0 * np.pi))
             if not abs(gap) <= tolerance * scale[a]:
@@ -44,17 +44,19 @@ def assign(field, P, rate, cuts, inside, X, periods, points, owners, scale, wrap
     """
     count, n = X.shape
     which, sigma = np.zeros(0, np.int64), np.zeros(0)
-    z = np.empty((n, 1))
+    z, times, steps = np.empty(n), np.empty(1), np.empty((0, 8, n))
     for i in range(count):
-        z[:, 0] = X[i]
+        for a in range(n):
+            z[a] = X[i, a]
         labels[i] = UNDECIDED
         h, row, last = 0.0, 0, UNDECIDED
         for _ in range(periods):
             status = DONE
             for c in range(cuts.shape[0] - 1):
-                status, _, h, _, _, _ = integrate(
-                    field, P, 1.0, 0.0, rate, cuts[c], cuts[c + 1], z, which, sigma, rtol, atol, h, inside, 100000, 0
-                )
+                status, _, h, _ = advance(
+                    field, P, 1.0, 0.0, rate, cuts[c] + inside, cuts[c + 1] - inside, cuts[c], cuts[c + 1], z, which,
+                    sigma, rtol, atol, h, 100000, 0, 0, times, steps,
+                )  # fmt: skip
                 if status != DONE:
                     break
             if status != DONE:
@@ -66,4 +68,5 @@ def assign(field, P, rate, cuts, inside, X, periods, points, owners, scale, wrap
             if now != UNDECIDED and row >= _IN_A_ROW:
                 labels[i] = now
                 break
-        X[i] = z[:, 0]
+        for a in range(n):
+            X[i, a] = z[a]
