@@ -62,6 +62,29 @@ def _bordered(own, arc, A, by_period, column, phase_row, arc_row, pull, row_size
 
 
 @kernel(inline=True)
+def _right_sides(own, arc, R, column, row_sizes, gap, along, x):  # type: ignore[no-untyped-def]
+    """x (2, N + arc): minus the residual, and what makes the tangent."""
+    inner = R.shape[0]
+    for i in range(inner):
+        x[0, i] = -R[i] / row_sizes[i]
+        x[1, i] = 0.0 if arc == 1 else -column[i] / row_sizes[i]
+    if own == 1:
+        x[0, inner], x[1, inner] = -gap, 0.0
+    if arc == 1:
+        x[0, inner + own], x[1, inner + own] = along, 1.0
+
+
+@kernel(inline=True)
+def _sign(full, pivots):  # type: ignore[no-untyped-def]
+    """Sign of the determinant from the factors."""
+    sign = 1
+    for i in range(pivots.shape[0]):
+        sign = -sign if full[i, i] < 0.0 else sign
+        sign = -sign if pivots[i] != i + 1 else sign
+    return sign
+
+
+@kernel(inline=True)
 def _largest(R, row_sizes, gap):  # type: ignore[no-untyped-def]
     """Largest residual over its size; nan where one is not finite."""
     largest, finite = abs(gap), True
@@ -121,14 +144,10 @@ def newton(  # type: ignore[no-untyped-def]
         if status in (CONVERGED, NOT_FINITE) or iterations >= most:
             break
         iterations += 1
+        along -= pull * (P[index] - P_given) if arc == 1 else 0.0
+        _right_sides(own, arc, R, column, row_sizes, gap, along, x)
         for i in range(inner):
             by_period[i] = -2.0 * np.pi / (T * T) * by_omega[i]
-            x[0, i] = -R[i] / row_sizes[i]
-            x[1, i] = 0.0 if arc == 1 else -column[i] / row_sizes[i]
-        if own == 1:
-            x[0, inner], x[1, inner] = -gap, 0.0
-        if arc == 1:
-            x[0, size], x[1, size] = along - pull * (P[index] - P_given), 1.0
         _bordered(own, arc, A, by_period, column, phase_row, arc_row, pull, row_sizes, full)
         sizes[0], sizes[1], sizes[2] = size + arc, 2, 0
         call_solver(solver, sizes, full, pivots, x)
@@ -154,10 +173,7 @@ def newton(  # type: ignore[no-untyped-def]
             break
         previous = change
     if iterations > 0:
-        sign = 1
-        for i in range(size + arc):
-            sign = -sign if full[i, i] < 0.0 else sign
-            sign = -sign if pivots[i] != i + 1 else sign
+        sign = _sign(full, pivots)
         if arc == 1:
             total = np.sqrt(_length(weights, x[1]) + (weight_l * x[1, size]) ** 2)
             for i in range(size + 1):
