@@ -35,6 +35,8 @@ METHODS = ("auto", "collocation", "shooting", "harmonic-balance", "equilibrium")
 @click.option("--multiple", type=click.IntRange(1), default=1, metavar="K", help="Orbits of K forcing periods.")
 @click.option("--winding", "turns", type=SETTING, multiple=True, metavar="ANGLE=TURNS",
               help="Rotations: whole turns of an angle per orbit, as theta=1; repeatable.")
+@click.option("--symmetric", is_flag=True,
+              help="Symmetric orbits, on half of their period where the equations allow it (collocation).")
 @click.option("--harmonics", type=click.IntRange(1), metavar="H",
               help="Of harmonic balance; by default as many as the motion needs.")
 @click.option("--switch", "labels", multiple=True, metavar="LABEL",
@@ -53,8 +55,8 @@ METHODS = ("auto", "collocation", "shooting", "harmonic-balance", "equilibrium")
 def command(
     console: Console, model: str, parameter: str, window: tuple[float, float], pairs: tuple[tuple[str, Any], ...],
     start: tuple[tuple[str, Any], ...], method: str, multiple: int, turns: tuple[tuple[str, Any], ...],
-    harmonics: int | None, labels: tuple[str, ...], curve: str | None, free: str | None, max_points: int,
-    ds_max: float | None, y: str | None, outputs: tuple[Path, ...], force: bool,
+    symmetric: bool, harmonics: int | None, labels: tuple[str, ...], curve: str | None, free: str | None,
+    max_points: int, ds_max: float | None, y: str | None, outputs: tuple[Path, ...], force: bool,
 ) -> int:  # fmt: skip
     """Follow a branch of MODEL along a parameter, with its stability and special points.
 
@@ -68,6 +70,7 @@ def command(
         raise click.UsageError("--locus LABEL and --free NAME belong together: which point, and the second parameter")
     chosen, first = settings(pairs), settings(start, "--start")
     orbit = {"multiple": multiple, "winding": settings(turns, "--winding"), "harmonics": harmonics}
+    orbit["symmetry"] = "auto" if symmetric else None
     steps = {"max_points": max_points, "ds_max": ds_max}
     check_outputs(outputs, FORMATS, force)
     begun = time.perf_counter()
@@ -119,13 +122,17 @@ def _problem(system: Any, method: str, orbit: dict[str, Any]) -> Any:
     multiple, winding, harmonics = orbit["multiple"], orbit["winding"] or None, orbit["harmonics"]
     if harmonics is not None and method != "harmonic-balance":
         raise click.UsageError("--harmonics belongs to --method harmonic-balance")
+    if orbit["symmetry"] is not None and method != "collocation":
+        raise click.UsageError("--symmetric belongs to --method collocation")
     if method == "equilibrium":
         if multiple != 1 or winding is not None:
             raise click.UsageError("--multiple and --winding are of periodic orbits: add --method collocation")
         return Equilibrium(system)
     if method == "harmonic-balance":
         return HarmonicBalance(system, harmonics=harmonics, subharmonic=multiple, winding=winding)
-    return (Shooting if method == "shooting" else Collocation)(system, multiple=multiple, winding=winding)
+    if method == "shooting":
+        return Shooting(system, multiple=multiple, winding=winding)
+    return Collocation(system, multiple=multiple, winding=winding, symmetry=orbit["symmetry"])
 
 
 def _write(branches: list[Branch], path: Path, y: str | None) -> None:
@@ -156,6 +163,7 @@ def _facts(branch: Branch) -> dict[str, Any]:
                 branch.name: point.params[branch.name],
                 "params": dict(point.params),
                 "criticality": None if point.criticality is None else str(point.criticality),
+                "symmetry_breaking": point.symmetry_breaking,
             }
             for point in branch.special
         ],
@@ -169,6 +177,7 @@ def _report(console: Console, branches: list[Branch], seconds: float, outputs: t
         rounding = 1e-13 * abs(branch.window[1] - branch.window[0])
         for point in branch.special:
             what = f"{point.kind}, {point.criticality}" if point.criticality else str(point.kind)
+            what += ", symmetry breaking" if point.symmetry_breaking else ""
             what += f" ({point.name})" if point.name else ""
             value = point.params[branch.name]
             value = 0.0 if abs(value) < rounding else value

@@ -101,6 +101,17 @@ def test_steps_and_periods(folder: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert len(few["special"]) == 2  # type: ignore[arg-type]
 
 
+def test_symmetric_orbits(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The symmetry-breaking points of x'' + 0.1 x' + x + x^3 = 5 cos omega t are those of the whole period."""
+    model = ["continue", "duffing_textbook", "--set", "delta=0.1", "--set", "gamma=5"]
+    arguments = [*model, "--parameter", "omega", "--range", "0.8:2.0"]
+    whole, half = (branches_of([*arguments, *more], capsys)[0]["special"] for more in ([], ["--symmetric"]))
+    assert [point["label"] for point in whole] == [point["label"] for point in half]  # type: ignore[attr-defined]
+    assert [point["symmetry_breaking"] for point in half] == [True, True]  # type: ignore[attr-defined]
+    places = [[point["omega"] for point in special] for special in (whole, half)]  # type: ignore[attr-defined]
+    assert places[0] == pytest.approx(places[1], abs=1e-6)
+
+
 ROTOR = """name = "rotor"
 coordinates = ["phi"]
 equations = ["phi'' + 0.2*phi' + w**2*A*sin(phi)*cos(w*t) + 0.05*sin(phi) = 0"]
