@@ -46,7 +46,7 @@ class _Images:
 
 def with_images(birth: Entry, half: Follower) -> tuple[list[Entry], Status]:
     """All entries of the branch, and the status of both of its ends."""
-    status, images = half.status or Status.STEP_TOO_SMALL, _Images()
+    status, images = half.status or Status.STOPPED, _Images()  # under way: stopped
     ends_in_pitchfork = status is Status.CLOSED_LOOP and half.entries and half.entries[-1].found is not None
     if ends_in_pitchfork:
         last = _exactly(half.settings, half.entries[-1])
