@@ -20,6 +20,7 @@ from ..systems.evaluators import evaluator
 __all__ = ["CompiledField"]
 
 Array = np.ndarray
+_KEPT = 64
 _KINDS = [ctypes.c_int64] + [ctypes.c_void_p] * 3 + [ctypes.c_int64] + [ctypes.c_void_p] * 3
 
 
@@ -45,6 +46,7 @@ class CompiledField:
     places: dict[str, int]
     expressions: tuple[Any, tuple[str, ...]]
     keep_alive: Any = field(default=None, repr=False)
+    _timings: dict[bytes, tuple[float, Array, Array]] = field(default_factory=dict, repr=False)
 
     @property
     def forced(self) -> bool:
@@ -60,6 +62,21 @@ class CompiledField:
     def breaks(self, params: Array) -> Array:
         """Phases in [0, 1) where the field jumps."""
         return np.asarray(self.evaluations.breaks(params))
+
+    def timing(self, params: Array) -> tuple[float, Array, Array]:
+        """(forcing period T, T_p / T (m,), breaks) at `params`, kept for a while; (1, zeros, none) without a period."""
+        key = params.tobytes()
+        known = self._timings.get(key)
+        if known is None:
+            if self.forced:
+                period = float(self.evaluations.period(params))
+                known = period, np.asarray(self.evaluations.period_gradient(params)) / period, self.breaks(params)
+            else:
+                known = 1.0, np.zeros(len(params)), np.zeros(0)
+            if len(self._timings) >= _KEPT:
+                self._timings.clear()
+            self._timings[key] = known
+        return known
 
     def divergence_free(self, params: Array) -> bool:
         """Whether sum dF_i/dx_i vanishes identically at `params` (False for Python functions)."""

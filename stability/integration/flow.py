@@ -10,6 +10,7 @@ the pieces end at the events and the variations pass them by saltation (integrat
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -118,28 +119,29 @@ def flow(
     params = system.parameter_vector() if params is None else np.array(params, float)
     x = system.state_vector(x0)
     n, (t0, t1) = len(x), (float(span[0]), float(span[1]))
-    if not (np.isfinite(t0) and np.isfinite(t1) and t1 > t0):
+    if not (math.isfinite(t0) and math.isfinite(t1) and t1 > t0):
         raise InputError(f"span = ({t0:g}, {t1:g}): two ascending finite times are needed")
-    if not 1e-15 < rtol < 1 or not (np.asarray(atol, float) > 0).all():
+    scales = np.empty(n)
+    scales[:] = atol
+    if not 1e-15 < rtol < 1 or not (scales > 0).all():
         raise InputError(f"rtol = {rtol:g} must lie in (1e-15, 1), atol = {atol} must be positive")
     if system.stops or has_switches(system):
         return _over_events(system, (t0, t1), x, params, rtol, atol, variations, parameters, dense, max_steps)
     compiled = CompiledField.of(system)
-    scales = np.array(np.broadcast_to(np.asarray(atol, float), (n,)))  # writable, as the kernel was compiled for
-    which = [-1] * (n if variations else 0) + [compiled.place(name) for name in parameters]
+    which = np.array([-1] * (n if variations else 0) + [compiled.place(name) for name in parameters], np.int64)
     z = np.zeros((n, 1 + len(which)))
     z[:, 0] = x
     if variations:
-        z[:, 1 : n + 1] = np.eye(n)
-    period, rates = _clock(compiled, params, which)
+        np.fill_diagonal(z[:, 1:], 1.0)
+    period, slopes, breaks = compiled.timing(params)
+    rates = np.where(which >= 0, slopes[which], 0.0) if len(parameters) else np.zeros(len(which))
     address = compiled.address if len(parameters) else compiled.evaluations.address("FJ" if variations else "F")
     steps, kept = 0, []
-    breaks = compiled.breaks(params) if compiled.forced else np.zeros(0)
     h = 0.0
     for start, end in pieces(compiled, t0, t1, period, breaks):
         inside = 1e-13 * max(period, abs(end)) if len(breaks) else 0.0
         status, s, h, count, times, coefficients = runge_kutta.integrate(
-            address, params, 1.0, 0.0, 1.0 / period, start, end, z, np.array(which, np.int64), rates, rtol,
+            address, params, 1.0, 0.0, 1.0 / period, start, end, z, which, rates, rtol,
             scales, h, inside, max_steps - steps, int(dense),
         )  # fmt: skip
         steps += count
@@ -181,15 +183,6 @@ def _over_events(
         columns[:, n if variations else 0 :].copy() if parameters else None,
         (motion.edges, motion.nested) if dense else None,
     )  # fmt: skip
-
-
-def _clock(compiled: CompiledField, params: Array, which: list[int]) -> tuple[float, Array]:
-    """Forcing period (1 for autonomous systems) and T_p / T of the parameters in `which`."""
-    if not compiled.forced:
-        return 1.0, np.zeros(len(which))
-    period = float(compiled.evaluations.period(params))
-    slope = compiled.evaluations.period_gradient(params)
-    return period, np.array([slope[k] / period if k >= 0 else 0.0 for k in which])
 
 
 def _failure(system: Any, status: int, t: float, x: Array, steps: int) -> Exception:

@@ -16,6 +16,7 @@ import math
 
 import numpy as np
 
+from stability.errors import InputError
 from stability.kernels import dop853_coefficients as method
 from stability.kernels.addresses import call_field
 from stability.kernels.caching import kernel
@@ -126,7 +127,7 @@ def _error(five, three, z, new, rtol, atol, P, which):  # type: ignore[no-untype
 
 @kernel(inline=True)
 def _first_step(field, P, sigma, rate, s, span, z, which, sigma_p, F, J, Fp, x, phase, K, work, rtol, atol):  # type: ignore[no-untyped-def]
-    """The step whose Taylor term of order 8 is of the tolerance's size, judged by an Euler step (Hairer et al., II.4)."""
+    """The step whose Taylor term of order 8 has the tolerance's size, judged by an Euler step (Hairer et al., II.4)."""
     n, columns = atol.shape[0], which.shape[0] + 1
     d0, d1, d2 = 0.0, 0.0, 0.0
     for a in range(n):
@@ -245,6 +246,8 @@ def integrate(
     dense = 1 keeps the steps. Returns (status, s reached, last h, steps, times (steps + 1,), coefficients
     (steps, 8, n)): on a step x(s + theta h) is built from the eight coefficients by `interpolate`.
     """
+    if not z.flags.c_contiguous:
+        raise InputError("z must be C-contiguous: it is advanced in place")
     n, low, high, room = len(z), s + inside, end - inside, 64 * dense
     times, coefficients = np.empty(room + 1), np.empty((room, 8, n))
     times[0] = s
