@@ -8,7 +8,6 @@ solver until it is asked for a solution between its points (`at`) or for more of
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -26,7 +25,7 @@ from ..words import Kind, Status, Verdict
 from .revival import revive
 from .solutions import frozen
 from .special import SpecialPoint
-from .storage import register, write
+from .storage import register, write, write_columns
 
 __all__ = ["Branch", "Columns", "Segment"]
 
@@ -340,11 +339,7 @@ class Branch:
 
     def to_csv(self, path: Any) -> None:
         """Write `to_dict` as comma-separated text with a header line."""
-        table = self.to_dict()
-        with open(path, "w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream)
-            writer.writerow(table)
-            writer.writerows(zip(*(a.tolist() for a in table.values())))
+        write_columns(path, self.to_dict())
 
     def __repr__(self) -> str:
         first, last = (f"{v:g}" for v in self.window)

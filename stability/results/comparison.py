@@ -92,10 +92,11 @@ class Difference:
     @classmethod
     def from_storage(cls, header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Difference:
         """The inverse of `to_storage`."""
-        rows = {key: tuple((p, Verdict(v), q) for p, v, q in header[key]) for key in ("missing", "extra")}
-        verdicts = tuple(Verdict(v) for v in header["verdicts"])
-        folds = tuple((a, b) for a, b in header["folds"])
-        return cls(name=header["name"], verdicts=verdicts, folds=folds, **rows, **arrays)
+        missing, extra = (tuple((p, Verdict(v), q) for p, v, q in header[key]) for key in ("missing", "extra"))
+        return cls(
+            header["name"], arrays["parameter"], arrays["reference"], arrays["value"],
+            tuple(Verdict(v) for v in header["verdicts"]), missing, extra, tuple((a, b) for a, b in header["folds"]),
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         median = float(np.median(np.abs(self.errors))) if self.errors.size else np.nan

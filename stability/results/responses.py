@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -16,7 +15,7 @@ from ..words import Kind
 from .branch import Branch
 from .bundles import packed, unpacked
 from .comparison import Comparison, distinct, swept
-from .storage import register, write
+from .storage import register, write, write_columns
 from .sweep import Sweep
 
 __all__ = ["Responses"]
@@ -153,11 +152,7 @@ class Responses(Mapping[str, Any]):
 
     def to_csv(self, path: Any) -> None:
         """Write `to_dict` as comma-separated text with a header line."""
-        table = self.to_dict()
-        with open(path, "w", newline="", encoding="utf-8") as stream:
-            writer = csv.writer(stream)
-            writer.writerow(table)
-            writer.writerows(zip(*(a.tolist() for a in table.values())))
+        write_columns(path, self.to_dict())
 
     def save(self, path: Any) -> None:
         """Write to a ``.npz`` file that `stability.load` reads: all branches and sweeps, errors, failures."""

@@ -11,6 +11,7 @@ needs: no solver is imported to plot a stored branch.
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import tempfile
@@ -25,7 +26,7 @@ from numpy.typing import NDArray
 
 from ..errors import FileFormatError, InputError
 
-__all__ = ["class_of", "load", "read", "register", "schema_of", "write"]
+__all__ = ["class_of", "load", "read", "register", "schema_of", "write", "write_columns"]
 
 _VERSION = 1
 _HEADER = "__header__"
@@ -122,6 +123,14 @@ def write(
     except BaseException:
         Path(temporary).unlink(missing_ok=True)
         raise
+
+
+def write_columns(path: str | os.PathLike[str], columns: Mapping[str, NDArray[Any]]) -> None:
+    """Columns of equal length as comma-separated text with a header line."""
+    with open(path, "w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream)
+        writer.writerow(columns)
+        writer.writerows(zip(*(a.tolist() for a in columns.values())))
 
 
 def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, NDArray[Any]]]:

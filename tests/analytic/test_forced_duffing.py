@@ -15,7 +15,7 @@ from exact_orbits import SMALL, amplitudes, assert_order, observed_orders, orbit
 from scipy.optimize import brentq, fsolve
 
 import stability as st
-from stability.errors import InputError, OpenResonanceWarning
+from stability.errors import InputError, OpenResonanceWarning, TruncationWarning
 
 XI, F, A = 0.1, 0.7, 1.5
 
@@ -199,7 +199,7 @@ def test_first_order_is_one_term_harmonic_balance():
     """Folds of `HarmonicBalance(harmonics=1)` and of the averaged branch are the same numbers."""
     model = st.models.duffing(xi=0.02, beta=0.001)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", StabilityWarning)  # one harmonic is too few, and says so
+        warnings.simplefilter("ignore", TruncationWarning)  # one harmonic is too few, and says so
         balanced = st.continuation(st.HarmonicBalance(model, harmonics=1), "Omega", (0.3, 3.0))
     slow = st.continuation(st.Equilibrium(st.averaging(model)), "Omega", (0.3, 3.0))
     for label in ("LP1", "LP2"):
