@@ -331,6 +331,8 @@ class Backbone:
         if not fields:
             return None
         new = dataclasses.replace(self, inner=inner.changed(**fields))
+        if set(fields) <= {"scales", "period_scale"}:
+            return new, u, tangent
         if tangent is not None:
             tangent = Tangent(self._carried(new, tangent.u), tangent.parameter, tangent.weight)
         return new, self._carried(new, u), tangent

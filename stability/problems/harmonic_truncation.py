@@ -176,6 +176,8 @@ def adapted(
     if not fields:
         return None
     new = problem.changed(**fields)
+    if set(fields) <= {"scales", "period_scale"}:
+        return new, u, tangent
     if tangent is not None:
         tangent = Tangent(_carried(problem, new, tangent.u), tangent.parameter, tangent.weight)
     return new, _carried(problem, new, u), tangent
