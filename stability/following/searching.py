@@ -21,6 +21,7 @@ from .points import Point
 __all__ = ["between", "hopped"]
 
 _DIP = 0.15  # a vertex below this part of its neighbours is looked at
+_MANY = 6  # values beyond which their product is no test
 _SUDDEN = 0.2  # a value that comes down to less than this part of itself in a step
 
 
@@ -86,9 +87,14 @@ def hopped(locator: Locator, a: Point, b: Point) -> bool:
 
 
 def _tests(b: Point) -> list[int]:
-    """Test functions to watch for dips; -1 and -2 stand for single real and complex values."""
+    """Test functions to watch for dips; -1 and -2 stand for single real and complex values.
+
+    The products of many values dip wherever a pair inside the limit turns past +1 or -1: single values tell more.
+    """
     if not b.spectrum.values.size:
         return [3]
+    if b.spectrum.values.size > _MANY:
+        return [3, -1, -2]
     return [3, 0, -1, -2] + [1] * (b.problem.critical.minus is not None)
 
 

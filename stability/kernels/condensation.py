@@ -155,8 +155,8 @@ def _collect(A, scale, kept, position, T, size, n, H, first, lanes, hold, column
 def condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, pivots, Z, M):  # type: ignore[no-untyped-def]
     """Factor every interval, overwrite `columns` (N, mn, K) by X = G^-1 C, fill LU, pivots, Z (N, mn, n), M (N, n, n).
 
-    LU (N, ms, ms) and pivots (N, ms) belong to the s kept states. Returns the product of the signs of the determinants
-    (0: a singular interval). Intervals are eliminated together, LANES at most, each step for all of them.
+    LU (N, ms, ms) and pivots (N, ms) belong to the s kept states; empty ones are left alone. Returns the product of the
+    signs of the determinants (0: a singular interval). Intervals are eliminated together, LANES at most.
     """
     intervals, extra = columns.shape[0], columns.shape[2]
     degree, small, n = W.shape[0], kept.shape[0], J.shape[1]
@@ -178,12 +178,13 @@ def condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, p
         sign *= eliminate_lanes(T, size, width, lanes, swaps, hold)
         if sign == 0.0:
             return 0.0
-        for row in range(size):
-            for q in range(lanes):
-                pivots[first + q, row] = swaps[row, q]
-            for k in range(size):
+        if LU.shape[0] > 0:
+            for row in range(size):
                 for q in range(lanes):
-                    LU[first + q, row, k] = T[row, k, q]
+                    pivots[first + q, row] = swaps[row, q]
+                for k in range(size):
+                    for q in range(lanes):
+                        LU[first + q, row, k] = T[row, k, q]
         substitute_lanes(T, size, width, lanes, hold)
         _collect(A, scale, kept, position, T, size, n, H, first, lanes, hold, columns, Z)
     for j in range(intervals):

@@ -293,7 +293,7 @@ class Collocation(OrbitDiscretisation):
         """`correct` on any mesh, at most `limit` iterations; its linearisation is a bare Workspace off the own mesh."""
         u, params = np.array(u, float), np.array(params, float)
         nodes, stages, _ = mesh.split(u)
-        work = Workspace(mesh, len(params), len(self.kept))
+        work = Workspace(mesh, len(params), len(self.kept), False)
         arc, t, t_l, weight = 0, u, 0.0, 0.0
         if tangent is not None:
             arc, t, t_l, weight = 1, _plain(tangent.u), float(tangent.parameter), float(tangent.weight)
@@ -343,7 +343,7 @@ class Collocation(OrbitDiscretisation):
         self, mesh: OrbitMesh, nodes: Array, stages: Array, rest: Array, params: Array, correct: bool
     ) -> tuple[Workspace, Array, float]:
         """(arrays, G^-1 stage residuals where `correct`, sign) of one evaluation and elimination; sign 0: failed."""
-        rule, work = mesh.rule, Workspace(mesh, len(params), len(self.kept))
+        rule, work = mesh.rule, Workspace(mesh, len(params), len(self.kept), True)
         work.T[:] = rest if mesh.own else 0.0
         stage, node = np.empty_like(stages), np.empty_like(nodes)
         residual, sigma = kernels.evaluate(

@@ -16,12 +16,12 @@ which needs the gradient of omega^T f_z (V, lambda) over z at the stages only (`
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..kernels.condensation import solve_stages
+from ..kernels.condensation import condense, solve_stages
 from ..kernels.condensation_reduced import reduce_and_solve, summary
 from ..kernels.condensation_sweeps import adjoint_sweep, forward_sweep
 from .orbit_mesh import OrbitMesh
@@ -34,17 +34,31 @@ __all__ = ["CollocationLinearisation", "Workspace"]
 Array = np.ndarray
 
 
+@cache
+def _keep_freed_memory() -> None:
+    """Free a large block once: the C library learns from it to keep what is freed later, up to twice that size.
+
+    It would hand some megabytes back to the system and ask for them again at every solve, a third of the time of one.
+    """
+    np.empty(1 << 21)
+
+
 class Workspace:
-    """The arrays a kernel fills at one linearisation: field and derivatives at the stages, factors, node relations."""
+    """The arrays a kernel fills at one linearisation: field and derivatives at the stages, factors, node relations.
+
+    Without `factors` LU and pivots are empty: large arrays that a point of a branch is never asked for.
+    """
 
     __slots__ = ("F", "Fp", "J", "LU", "M", "T", "Z", "dT", "pivots")
 
-    def __init__(self, mesh: OrbitMesh, m: int, kept: int) -> None:
+    def __init__(self, mesh: OrbitMesh, m: int, kept: int, factors: bool) -> None:
+        _keep_freed_memory()
         count, N, n = mesh.intervals * mesh.degree, mesh.intervals, mesh.n
         size = mesh.degree * kept
         self.F, self.J, self.Fp = np.empty((count, n)), np.empty((count, n, n)), np.empty((count, n, m))
         self.T, self.dT = np.zeros(1), np.zeros(m)
-        self.LU, self.pivots = np.empty((N, size, size)), np.empty((N, size), np.int64)
+        stored = N if factors else 0
+        self.LU, self.pivots = np.empty((stored, size, size)), np.empty((stored, size), np.int64)
         self.Z, self.M = np.empty((N, mesh.degree * n, n)), np.empty((N, n, n))
 
 
@@ -143,8 +157,23 @@ class CollocationLinearisation:
 
     # ------------------------------------------------------------------ solving
     def _factors(self) -> tuple[Any, ...]:
+        mesh, problem = self.mesh, self.problem
+        LU, pivots = self._eliminated
+        return mesh.rule.matrix, mesh.h, self.sigma, self.work.J, problem.kept, problem.position, LU, pivots
+
+    @cached_property
+    def _eliminated(self) -> tuple[Array, Array]:
+        """LU and pivots; made now where the Newton solve has not kept them."""
         mesh, work, problem = self.mesh, self.work, self.problem
-        return mesh.rule.matrix, mesh.h, self.sigma, work.J, problem.kept, problem.position, work.LU, work.pivots
+        if not len(work.LU):
+            other = Workspace(mesh, len(self.params), len(problem.kept), True)
+            rule, none = mesh.rule, np.empty((mesh.intervals, mesh.degree * mesh.n, 0))
+            condense(
+                rule.inverse, rule.matrix, rule.row_sums, rule.update, mesh.h, self.sigma, work.J, problem.kept,
+                problem.position, none, other.LU, other.pivots, other.Z, other.M,
+            )  # fmt: skip
+            work.LU, work.pivots = other.LU, other.pivots
+        return work.LU, work.pivots
 
     def solve(self, rows: Array, columns: Array, corner: Array, right_sides: Array) -> Array:
         """Solve [[F_u, columns], [rows, corner]] x = right_sides; singular: non-finite numbers."""
@@ -187,7 +216,7 @@ class CollocationLinearisation:
 
     @cached_property
     def summary(self) -> tuple[Array, float, float]:
-        """Phi, int tr J ds, roughness of the solution: the largest m-th derivative over m! of its scaled polynomials."""
+        """Phi, int tr J ds, roughness: the largest m-th derivative over m! of the scaled polynomials of the solution."""
         mesh, work = self.mesh, self.work
         nodes, stages, _ = mesh.split(self.solution)
         product, trace, roughness = summary(
