@@ -45,7 +45,9 @@ class Monitor:
                     continue
                 # a knot may lie on the zero itself: the middle of a segment that is symmetric about it
                 point = q if gq == 0 else locator.zero(p, q, exact, gp, gq)
-                found += _named(kind, point, p, q, max(abs(gp), abs(gq)))
+                named = _named(kind, point, p, q, max(abs(gp), abs(gq)))
+                # two functions may vanish at one point: both rates do at a cusp
+                found += [f for f in named if all(f.kind is not g.kind or f.bracket != g.bracket for g in found)]
         return found + self._crossings(locator, knots)
 
     def _crossings(self, locator: Locator, knots: list[Point]) -> list[Found]:

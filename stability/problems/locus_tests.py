@@ -147,7 +147,7 @@ def _extreme(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
     first, second = abs(_first(point)), abs(_second(point))
     jumps = (first if kind is Kind.FOLD else second) > 0.1 * scale  # a singular point: the family begins there
     if curve.kind is Kind.FOLD and max(first, second) < (_STILL_JUMP if jumps else _STILL):
-        return Kind.CUSP if kind is Kind.FOLD else None
+        return Kind.CUSP
     if jumps:
         return None
     if kind is Kind.FOLD or curve.kind is not Kind.FOLD:
