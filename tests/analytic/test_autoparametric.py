@@ -195,7 +195,6 @@ def torus_points(e):
     return sorted((p.params["eta"] - 1) / e for p in branch.special if p.kind is st.Kind.NEIMARK_SACKER)
 
 
-@pytest.mark.slow
 def test_hopf_points_converge_to_torus_points():
     """Row 5d: the upper edge of the window; full values .17744 .19773 .20603 .20951, order 1.13-1.22."""
     listed = {0.1: 0.17744, 0.05: 0.19773, 0.025: 0.20603, 0.0125: 0.20951}
@@ -231,7 +230,6 @@ def nontrivial(problem, kind, window):
     return sorted({round(p.params["Omega"], 8) for p in branch.special if p.kind is kind})
 
 
-@pytest.mark.slow
 def test_hopf_points_of_the_averaged_pendulum_converge_to_torus_points():
     """(Omega - 1)/eps of the Hopf points against the full pendulum's torus points: order 1, and 2 by second order."""
     small = (0.04, 0.02, 0.01)
