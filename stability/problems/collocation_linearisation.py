@@ -216,7 +216,7 @@ class CollocationLinearisation:
 
     @cached_property
     def summary(self) -> tuple[Array, float, float]:
-        """Phi, int tr J ds, roughness: the largest m-th derivative over m! of the scaled polynomials of the solution."""
+        """Phi, int tr J ds, roughness: the largest m-th derivative (over m!) of the solution over its scales."""
         mesh, work = self.mesh, self.work
         nodes, stages, _ = mesh.split(self.solution)
         product, trace, roughness = summary(
