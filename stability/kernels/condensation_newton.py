@@ -254,17 +254,19 @@ def newton(  # type: ignore[no-untyped-def]
         _shift(moved, x, damping, (intervals + 1) * n)
         moved_T, moved_l = moved_T + damping * x[0, last], moved_l + damping * change_l
         P[free] += damping * change_l
-        if change <= tolerance * (1.0 + length):
+        if _settled(change / (1.0 + length), previous / (1.0 + length), residual, tolerance):
             status = CONVERGED
-            break
-        stalled = change > 0.3 * previous and change <= STALLED * (1.0 + length)
-        if stalled and residual <= ROUNDING:
-            status = CONVERGED  # an ill-conditioned orbit, solved as far as its digits go
             break
         if arc == 1 and iterations > 1 and change > 2.0 * previous:
             break
         previous = change
     return status, iterations, residual, sign, x
+
+
+@kernel(inline=True)
+def _settled(change, previous, residual, tolerance):  # type: ignore[no-untyped-def]
+    """A correction below the tolerance, or one that rounding keeps from falling: as far as the digits go."""
+    return change <= tolerance or (0.3 * previous < change <= STALLED and residual <= ROUNDING)
 
 
 @kernel(inline=True)
