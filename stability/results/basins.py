@@ -51,6 +51,8 @@ class Basins:
     labels : (ny, nx) int, index into `attractors`, -1 escaped, -2 undecided
     attractors : tuple of Attractor
     states : tuple of str;  params : mapping
+    agreement : part of some cells, spread over the grid, that came to the same attractor when followed by integration
+        (where a table of the stroboscopic map was used; else 1)
     """
 
     system: str
@@ -62,6 +64,7 @@ class Basins:
     attractors: tuple[Attractor, ...]
     states: tuple[str, ...]
     params: Mapping[str, float]
+    agreement: float = 1.0
 
     def __post_init__(self) -> None:
         for key in ("x", "y"):
@@ -95,6 +98,7 @@ class Basins:
         """Write to ``.npz``; `load` reads it back."""
         plain = ("system", "x_name", "y_name", "states", "params")
         header: dict[str, Any] = {k: getattr(self, k) for k in plain}
+        header["agreement"] = self.agreement
         header["attractors"] = [[a.label, a.multiple, a.share] for a in self.attractors]
         arrays = {"x": self.x, "y": self.y, "labels": self.labels}
         write(path, "basins", header, arrays | {f"points{a.label}": a.points for a in self.attractors})

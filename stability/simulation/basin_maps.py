@@ -4,13 +4,16 @@ First a coarse subset of the grid is followed for many periods; where the strobo
 (up to 8) they are an attractor, and two ends belong to the same one when a point of one is a point of the other. Then
 every cell is followed until it stays near the points of a known attractor (kernels/strobing.py). What is left is
 looked at like the subset, so that attractors with small basins are found, too. Rows of the grid are independent: the
-result does not depend on the number of threads.
+result does not depend on the number of threads. Where a large grid spans both states of a system, the cells are
+followed by a table of the stroboscopic map (simulation/strobe_tables.py), and some of them by integration, too: their
+`agreement` is reported.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from os import cpu_count
 from typing import Any
 
@@ -20,6 +23,7 @@ from ..errors import InputError, check_names
 from ..integration.engine import Engine, Precision
 from ..kernels import strobing
 from ..results.basins import Attractor, Basins
+from .strobe_tables import tabulated
 
 __all__ = ["basins"]
 
@@ -27,6 +31,9 @@ Array = np.ndarray
 _COARSE = 15  # the subset has at most so many cells along each axis
 _LONGEST = 8
 _ROUNDS = 6
+_EARLY = 12  # periods of the subset whose states are kept track of
+_CHUNK = 10
+_CHECKED = 200  # cells of a table's basins that are integrated, too
 _FLOOR = 0.01  # of the largest initial value: the least scale of a state, where attractors are at rest
 
 
@@ -77,9 +84,12 @@ def basins(
     ends = X.reshape(ny, nx, -1).copy()
     threads = 1 if engine.compiled.evaluations.backend != "llvm" else workers or cpu_count() or 1
     with ThreadPoolExecutor(min(threads, ny)) as pool:
-        for k, _ in enumerate(pool.map(lambda row: run.assign(ends[row], labels[row]), range(ny))):
+        table = tabulated(run, X, pool, progress, ny)
+        label = run.assign if table is None else partial(table.assign, run)
+        before = 0 if table is None else table.rows
+        for k, _ in enumerate(pool.map(lambda row: label(ends[row], labels[row]), range(ny))):
             if progress is not None:
-                progress(k + 1, ny)
+                progress(before + k + 1, before + ny)
     for _ in range(_ROUNDS):  # attractors that the subset did not see
         left = labels == strobing.UNDECIDED
         before = len(run.found)
@@ -96,7 +106,18 @@ def basins(
         Attractor(k, points, multiple, float((labels == k).mean())) for k, (points, multiple) in enumerate(run.found)
     )
     named = dict(zip(system.parameters, run.params.tolist()))
-    return Basins(system.name, x[0], y[0], grids[0], grids[1], labels, attractors, tuple(system.states), named)
+    agreement = 1.0 if table is None else _agreement(run, X, labels.ravel())
+    return Basins(
+        system.name, x[0], y[0], grids[0], grids[1], labels, attractors, tuple(system.states), named, agreement
+    )  # fmt: skip
+
+
+def _agreement(run: _Follower, X: Array, labels: Array) -> float:
+    """Part of some cells, spread over the grid, that come to the same attractor by integration."""
+    some = np.unique(np.linspace(0, len(X) - 1, _CHECKED).astype(int) * 7919 % len(X))
+    again = np.empty(some.size, np.int64)
+    run.assign(X[some].copy(), again)
+    return float((again == labels[some]).mean())
 
 
 def _checked(
@@ -139,16 +160,23 @@ class _Follower:
         self.wraps = np.isin(engine.system.states, engine.system.angles)
         self.scale = np.ones(n)
         self.found: list[tuple[Array, int]] = []
+        self.escaped = 0.0  # part of the subset
+        self.seen = np.full(n, np.inf), np.full(n, -np.inf)  # least and largest stroboscopic states of the subset
+
+    def targets(self) -> tuple[Array, Array]:
+        """Points (K, n) of the known attractors, and whose they are (K,)."""
+        points = np.vstack([p for p, _ in self.found]) if self.found else np.zeros((0, len(self.scale)))
+        return np.ascontiguousarray(points), np.repeat(
+            np.arange(len(self.found)), [len(p) for p, _ in self.found]
+        ).astype(np.int64)
 
     def assign(self, states: Array, labels: Array, periods: int | None = None, known: bool = True) -> None:
         """Follow states (N, n) in place and label them."""
         n = states.shape[1]
-        points = np.vstack([p for p, _ in self.found]) if self.found and known else np.zeros((0, n))
-        sizes = [len(p) for p, _ in self.found] if known else []
-        owners = np.repeat(np.arange(len(sizes)), sizes).astype(np.int64)
+        points, owners = self.targets() if known else (np.zeros((0, n)), np.zeros(0, np.int64))
         strobing.assign(
             self.engine.address, self.params, 1.0 / self.period, self.cuts, self.inside, states,
-            self.periods if periods is None else periods, np.ascontiguousarray(points), owners, self.scale, self.wraps,
+            self.periods if periods is None else periods, points, owners, self.scale, self.wraps,
             self.tolerance, self.rtol, self.scales, labels,
         )  # fmt: skip
 
@@ -156,9 +184,18 @@ class _Follower:
         """Follow some states to their ends and add the attractors that are new."""
         labels = np.empty(len(states), np.int64)
         states, widest = np.ascontiguousarray(states), np.abs(states).max(axis=0)
+        whole = len(states)
         if not already:
+            for _ in range(_EARLY):
+                self.assign(states, labels, periods=1, known=False)
+                states = states[labels != strobing.ESCAPED]
+                labels = labels[: len(states)]
+                self.seen = np.minimum(self.seen[0], states.min(axis=0, initial=np.inf)), np.maximum(
+                    self.seen[1], states.max(axis=0, initial=-np.inf)
+                )
             self.assign(states, labels, known=False)
             states = states[labels != strobing.ESCAPED]
+            self.escaped = 1.0 - len(states) / whole
         if not len(states):
             return
         track = [states.copy()]
@@ -173,6 +210,19 @@ class _Follower:
             self.scale = np.where(ranges > 0, ranges, 1.0)
         for k in range(len(states)):
             self._add(strobes[:, k])
+
+    def mean_periods(self, cells: Array) -> float:
+        """How many periods some of the cells (N, n) take on average."""
+        states = np.ascontiguousarray(cells[:: max(1, len(cells) // 50)])
+        total, count = 0, len(states)
+        for _ in range(0, self.periods, _CHUNK):
+            labels = np.empty(len(states), np.int64)
+            self.assign(states, labels, periods=_CHUNK)
+            total += _CHUNK * len(states)
+            states = np.ascontiguousarray(states[labels == strobing.UNDECIDED])
+            if not len(states):
+                break
+        return total / count
 
     def _distance(self, a: Array, b: Array) -> Array:
         gap = a - b

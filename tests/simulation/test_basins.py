@@ -7,6 +7,7 @@ import pytest
 
 import stability as st
 from stability.errors import InputError, UnknownNameError
+from stability.simulation.strobe_tables import tabulated
 
 
 def grid(shape, **options):
@@ -42,6 +43,38 @@ def test_threads_do_not_matter_and_storage(tmp_path):
     assert repr(back) == repr(one) and np.array_equal(back.labels, one.labels)
     axes = back.plot()
     assert axes.get_xlabel() == "$y$" and len(axes.lines) == 2
+
+
+def test_a_table_of_the_map_gives_what_integration_gives(tmp_path, monkeypatch):
+    """Two attractors, a turning angle: every cell alike; the same for any number of threads; where some motions escape
+    the table must not be used, or agree."""
+    from stability.simulation import basin_maps
+
+    cases = [
+        (st.models.duffing.from_physical(), dict(x=("y", -6e-3, 6e-3), y=("y_dot", -0.8, 0.8), shape=(80, 60))),
+        (st.models.base_driven_pendulum(epsilon=0.1, Omega=2.0, xi=0.05),
+         dict(x=("phi", 0.1, 0.1 + 2 * np.pi), y=("phi_dot", -1.5, 1.5), shape=(90, 80))),
+    ]  # fmt: skip
+    made = []
+    for system, arguments in cases:
+        seen = []
+        with monkeypatch.context() as patch:
+            patch.setattr(basin_maps, "tabulated", lambda *a: made.append(tabulated(*a)) or made[-1])
+            fast = st.basins(system, **arguments, progress=lambda k, n, seen=seen: seen.append((k, n)))
+        with monkeypatch.context() as patch:
+            patch.setattr(basin_maps, "tabulated", lambda *a: None)
+            slow = st.basins(system, **arguments)
+        assert made[-1] is not None and (fast.labels == slow.labels).mean() > 0.999
+        assert fast.agreement > 0.99 and slow.agreement == 1.0
+        assert [a.multiple for a in fast.attractors] == [a.multiple for a in slow.attractors]
+        assert seen[-1][0] == seen[-1][1] and [k for k, _ in seen] == sorted({k for k, _ in seen})
+    soft = st.models.duffing_textbook(alpha=1.0, beta=-1.0, delta=0.05, gamma=0.05, omega=1.2)
+    few = st.basins(soft, x=("x", -0.85, 0.8), y=("x_dot", -0.3, 0.4), shape=(12, 10))
+    assert 0 < few.escaped < 0.2 and few.agreement == 1.0
+    again = st.basins(cases[0][0], **cases[0][1], workers=1)
+    assert np.array_equal(again.labels, st.basins(cases[0][0], **cases[0][1], workers=2).labels)
+    again.save(tmp_path / "b.npz")
+    assert st.load(tmp_path / "b.npz").agreement == again.agreement
 
 
 def test_escape_over_a_softening_spring():
