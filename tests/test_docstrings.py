@@ -99,12 +99,17 @@ OPEN: dict[str, Callable[[Any], Any]] = {
     "chart": lambda f: f(models.mathieu(), x=("a", 0, 1), y=("b", 0, 1), no_such_keyword=1.0),
     "families": lambda f: f(stability.Collocation(models.duffing()), "Omega", (0.5, 0.6), no_such_keyword=1.0),
     "linear_response": lambda f: f(models.linear_oscillator(), no_such_keyword=1.0),
+    "loci": lambda f: f(
+        stability.Collocation(models.duffing()), "Omega", (0.5, 0.6), free="beta", free_window=(0.0, 1.0), cuts=1,
+        no_such_keyword=1.0,
+    ),
     "lyapunov": lambda f: f(models.duffing(), 10.0, no_such_keyword=1.0),
     "monodromy": lambda f: f(models.mathieu(), no_such_keyword=1.0),
     "reconstruct": lambda f: f(stability.averaging(models.duffing()), [1.0, 0.0], 0.0, no_such_keyword=1.0),
     "reconstruction_residual": lambda f: f(
         models.duffing(), stability.averaging(models.duffing()), [1.0, 0.0], no_such_keyword=1.0
     ),
+    "sensitivity": lambda f: f(stability.Collocation(models.duffing()), "u.max", no_such_keyword=1.0),
     "simulate": lambda f: f(models.mathieu(), (0.0, 1.0), no_such_keyword=1.0),
     "solve": lambda f: f(stability.Collocation(models.duffing()), no_such_keyword=1.0),
     "sweep": lambda f: f(models.duffing(), "Omega", (0.5, 0.6), no_such_keyword=1.0),

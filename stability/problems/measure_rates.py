@@ -74,6 +74,8 @@ def sensitivity(
     -50.0
     """
     if isinstance(problem, SpecialPoint):
+        if start is not None or params:
+            raise InputError("a special point has its own solution and parameters: sensitivity(point, of) is all it takes")
         return problem.sensitivity(of)  # type: ignore[no-any-return]
     names = list(problem.parameters)
     check_names("parameter", params, names, "this problem")
