@@ -226,19 +226,40 @@ def _log(z: complex) -> float:
 
 
 def matched(points: tuple[Point, Point, Point]) -> list[Triple]:
-    """Every value of the middle point between its partners: the nearest in the other two spectra, each used once."""
+    """Every value of the middle point between its partners: the nearest in the other two spectra, each used once.
+
+    Where two values have the same nearest one, real values are matched in their order as well: one of both is right.
+    """
     first, middle, last = (p.spectrum.values for p in points)
     if not first.size == middle.size == last.size:
         return []
     values = middle.tolist()
-    return list(zip(_partners(middle, values, first), values, _partners(middle, values, last)))
+    (earlier, one), (later, other) = _partners(middle, values, first), _partners(middle, values, last)
+    triples = list(zip(earlier, values, later))
+    if one or other:
+        triples += _in_order([first.tolist(), values, last.tolist()], points[0].problem.critical.circle)
+    return triples
 
 
-def _partners(middle: NDArray[np.complex128], values: list[complex], others: NDArray[np.complex128]) -> list[complex]:
-    """For every value its partner (see `_assigned`); a few values are nearest to different ones almost always."""
+def _in_order(spectra: list[list[complex]], circle: bool) -> list[Triple]:
+    """Real values (multipliers: of one sign) of three spectra in order of size, where there are equally many."""
+    triples: list[Triple] = []
+    for sign in (1.0, -1.0) if circle else (0.0,):
+        rows = [sorted((z for z in row if z.imag == 0.0 and z.real * sign >= 0.0), key=abs) for row in spectra]
+        if not circle:
+            rows = [sorted(row, key=lambda z: z.real) for row in rows]
+        if len(rows[0]) == len(rows[1]) == len(rows[2]):
+            triples += list(zip(*rows))
+    return triples
+
+
+def _partners(
+    middle: NDArray[np.complex128], values: list[complex], others: NDArray[np.complex128]
+) -> tuple[list[complex], bool]:
+    """For every value its partner (see `_assigned`), and whether two wanted the same; a few values seldom do."""
     listed = others.tolist()
     if len(values) > _FEW:
-        return [listed[k] for k in _assigned(middle, others).tolist()]
+        return [listed[k] for k in _assigned(middle, others).tolist()], False
     chosen = []
     for value in values:
         least, place = math.inf, 0
@@ -247,9 +268,10 @@ def _partners(middle: NDArray[np.complex128], values: list[complex], others: NDA
             if gap < least:
                 least, place = gap, k
         chosen.append(place)
-    if len(set(chosen)) < len(values):
+    clash = len(set(chosen)) < len(values)
+    if clash:
         chosen = _assigned(middle, others).tolist()
-    return [listed[k] for k in chosen]
+    return [listed[k] for k in chosen], clash
 
 
 def _assigned(values: NDArray[np.complex128], others: NDArray[np.complex128]) -> NDArray[np.int64]:
