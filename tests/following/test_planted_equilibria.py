@@ -52,9 +52,9 @@ def test_three_thousand() -> None:
 
 
 def test_pairs_between_two_points_of_the_branch() -> None:
-    """705: the other curve of a transcritical pair runs 1e-4 away, where a step hops; 1829: two values near zero at
-    once; 2036: the mesh changes between the two steps that show the dip."""
-    check((705, 1829, 2036))
+    """705: the other curve of a transcritical pair runs 1e-4 away, where a step hops; 1829, 3020: two values near zero
+    at once; 2036: the mesh changes between the two steps that show the dip."""
+    check((705, 1829, 2036, 3020))
 
 
 def test_same_points_in_either_direction() -> None:
