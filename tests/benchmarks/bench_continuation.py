@@ -1,11 +1,15 @@
 """Whole branches of periodic orbits beside AUTO-07p: same mesh (NTST, NCOL), tolerance, window, special points.
 
-Run:  python tests/benchmarks/bench_continuation.py [duffing fold pendulum chain]
+Run:  python tests/benchmarks/bench_continuation.py [duffing fold pendulum chain peak cold]
 
 AUTO (the Debian package auto-07p) gets the equations as generated C code with analytic derivatives, and the forcing as
-its usual oscillator of two more states. Both sides run on one thread; times are processor times, the least of several
-runs; AUTO's include reading constants and writing its files, ours the whole of `continuation` in a running interpreter
-(compilation is a line of its own). Ratios are what counts.
+its usual oscillator of two more states. Both sides run on one thread, in turns; times are processor times, the least
+of several runs; AUTO's include reading constants and writing its files, ours the whole of `continuation` in a running
+interpreter (cold starts are lines of their own). Ratios are what counts: of whole runs and per accepted point.
+
+Three comparisons: equal mesh, degree and tolerance (AUTO at the usual DSMAX and at the best one that finds the same
+points; we with our own steps, and with as many as AUTO takes); then equal delivered accuracy, every special point to
+1e-9 against a converged reference, each side with the cheapest settings of a grid that deliver it.
 """
 
 from __future__ import annotations
@@ -22,12 +26,16 @@ import subprocess
 import sys
 import tempfile
 import time
+import warnings
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import sympy as sp
 
 import stability as st
+from stability.errors import StabilityWarning
 
 STUB = "#include <stdlib.h>\nvoid _gfortran_os_error_at(const char *a, const char *b, ...) { abort(); }\n"
 EMPTY = """
@@ -120,84 +128,73 @@ def auto_executable(folder: Path, source: str, home: Path) -> Path | None:
     return folder / "eq.exe" if done.returncode == 0 else None
 
 
-def auto_run(system, orbit, Omega, window, intervals, degree, repeats, ds_max=0.2):
-    """(processor seconds, accepted points, special parameter values) of one branch; None without AUTO."""
+@contextmanager
+def auto_program(system, orbit, Omega):
+    """A function (window, NTST, NCOL, DSMAX, EPS) -> (seconds, points, special values) of AUTO; None without AUTO."""
     home = auto_directory()
-    if home is None:
-        return None
-    n, index = len(system.states) + 2, list(system.parameters).index(Omega) + 1
-    lo, hi = min(window), max(window)
-    sign = 1 if window[1] > window[0] else -1
-    constants = (
-        f"NDIM={n}, IPS=2, IRS=0, ILP=1, ISP=2, ISW=1, ICP=[{index},11]\nNTST={intervals}, NCOL={degree}, IAD=3, IPLT=0\n"
-        f"NMX=20000, RL0={lo - 1e-3}, RL1={hi + 1e-3}, NPR=100000, MXBF=0, IID=0, ITMX=8, ITNW=7, NWTN=3, JAC=1\n"
-        f"EPSL=1e-8, EPSU=1e-8, EPSS=1e-7, DS={sign * 0.01}, DSMIN=1e-6, DSMAX={ds_max}, IADS=1\n"
-    )
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        executable = auto_executable(folder, auto_source(system, orbit, Omega), home)
+        executable = None if home is None else auto_executable(folder, auto_source(system, orbit, Omega), home)
         if executable is None:
-            return None
-        best = np.inf
-        for _ in range(repeats):
+            yield None
+            return
+        n, index = len(system.states) + 2, list(system.parameters).index(Omega) + 1
+
+        def run(window, intervals, degree, ds_max=0.2, eps=1e-8):
+            lo, hi, sign = min(window), max(window), 1 if window[1] > window[0] else -1
+            constants = (
+                f"NDIM={n}, IPS=2, IRS=0, ILP=1, ISP=2, ISW=1, ICP=[{index},11]\nNTST={intervals}, NCOL={degree}, IAD=3\n"
+                f"NMX=20000, RL0={lo - 1e-3}, RL1={hi + 1e-3}, NPR=100000, MXBF=0, IID=0, ITMX=8, ITNW=7, NWTN=3, JAC=1\n"
+                f"IPLT=0, EPSL={eps}, EPSU={eps}, EPSS={10 * eps}, DS={sign * 0.01}, DSMIN=1e-6, DSMAX={ds_max}, IADS=1\n"
+            )
             before = resource.getrusage(resource.RUSAGE_CHILDREN)
             subprocess.run([executable], cwd=folder, input=constants, text=True, capture_output=True)
             after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            best = min(best, after.ru_utime - before.ru_utime)
-        rows = [r.split() for r in (folder / "fort.7").read_text().splitlines()]
-        rows = [r for r in rows if r and r[0] not in ("0",)]
-        special = [(int(r[2]), float(r[4])) for r in rows if int(r[2]) % 10 in (1, 2, 5, 6, 7, 8)]
-        return best, max(abs(int(r[1])) for r in rows), special
+            rows = [r.split() for r in (folder / "fort.7").read_text().splitlines()]
+            rows = [r for r in rows if r and r[0] != "0"]
+            special = [(_AUTO_KINDS[int(r[2]) % 10], float(r[4])) for r in rows if int(r[2]) % 10 in _AUTO_KINDS]
+            return after.ru_utime - before.ru_utime, max((abs(int(r[1])) for r in rows), default=0), special
+
+        yield run
+
+
+_AUTO_KINDS = {1: "BP", 2: "BP", 5: "LP", 6: "BP", 7: "PD", 8: "TR"}
 
 
 # ---------------------------------------------------------------------- ours
-def ours(system, Omega, window, intervals, degree, repeats, **keywords):
-    best = np.inf
+def our_run(system, Omega, window, intervals, degree, ds_max=None, tolerance=1e-8, **keywords):
+    """(processor seconds, points, special values) of one branch."""
+    problem = st.Collocation(system, degree=degree, intervals=intervals, **keywords)
+    start = time.process_time()
+    branch = st.continuation(problem, Omega, window, ds_max=ds_max, tolerance=tolerance)
+    seconds = time.process_time() - start
+    return seconds, len(branch), [(s.kind.label, s.params[Omega]) for s in branch.special]
+
+
+def least(calls, repeats):
+    """The least time of each call, interleaved, with the rest of its answer; a call may be None."""
+    best = [None] * len(calls)
     for _ in range(repeats):
-        problem = st.Collocation(system, degree=degree, intervals=intervals, **keywords)
-        start = time.process_time()
-        branch = st.continuation(problem, Omega, window, tolerance=1e-8)
-        best = min(best, time.process_time() - start)
-    return best, len(branch.columns[Omega]), branch
+        for k, call in enumerate(calls):
+            got = None if call is None else call()
+            if got is not None and (best[k] is None or got[0] < best[k][0]):
+                best[k] = got
+    return best
 
 
-def kernel_cost(system, intervals, degree, params):
-    """Microseconds of one Newton iteration in the kernel, of the linearisation, of the spectrum with its error."""
-    problem = st.Collocation(system, degree=degree, intervals=intervals)
-    u = problem.start(params)
-    name = next(iter(problem.parameters))
-
-    def least(call, count=60):
-        times = []
-        for _ in range(7):
-            start = time.process_time()
-            for _ in range(count):
-                call()
-            times.append((time.process_time() - start) / count * 1e6)
-        return min(times)
-
-    found = problem.correct(u, params, name, None, 0.0, 1e-9)
-
-    def spectrum():
-        problem._memo.clear()
-        problem.spectrum(found.linearisation)
-
-    per_solve = least(lambda: problem.correct(u, params, name, None, 0.0, 1e-9)) / found.iterations
-    return per_solve, least(lambda: problem.linearise(u, params)), least(spectrum)
+def agree(special, wanted, error=1e-6):
+    """Whether the special points are those wanted, by kind and to `error` in the parameter."""
+    one, other = sorted(special, key=lambda s: s[1]), sorted(wanted, key=lambda s: s[1])
+    return len(one) == len(other) and all(a[0] == b[0] and abs(a[1] - b[1]) <= error for a, b in zip(one, other))
 
 
-def duffing(beta):
-    return st.models.duffing(xi=0.02, beta=beta)
+def worst(special, wanted):
+    """Largest difference of the special values."""
+    return max((abs(a[1] - b[1]) for a, b in zip(sorted(special, key=lambda s: s[1]), sorted(wanted, key=lambda s: s[1]))),
+               default=0.0)  # fmt: skip
 
 
-CASES = {
-    "duffing": (lambda: duffing(0.001), (0.3, 3.0), 50, 4, 9),
-    "fold": (lambda: duffing(0.05), (3.0, 0.3), 50, 4, 9),
-    "pendulum": (lambda: st.models.autoparametric_pendulum(), (0.7, 1.3), 50, 4, 5),
-    "chain": (lambda: hardening_chain(10), (0.05, 0.25), 50, 4, 2),
-}
-
-
+# ---------------------------------------------------------------------- the tables
 def hardening_chain(count):
     """`count` unit masses in a row, springs q + 0.1 q^3, relative dampers 0.05, the first one forced."""
     t = sp.Symbol("t", real=True)
@@ -216,39 +213,127 @@ def hardening_chain(count):
     )
 
 
+CASES = {  # system, window, NTST, NCOL, repeats
+    "duffing": (lambda: st.models.duffing(xi=0.02, beta=0.001), (0.3, 3.0), 50, 4, 9),
+    "fold": (lambda: st.models.duffing(xi=0.02, beta=0.05), (3.0, 0.3), 50, 4, 9),
+    "pendulum": (lambda: st.models.autoparametric_pendulum(), (0.7, 1.3), 50, 4, 5),
+    "chain": (lambda: hardening_chain(10), (0.05, 0.25), 50, 4, 2),
+    "peak": (lambda: hardening_chain(10), (0.25, 0.34), 50, 4, 2),
+}
+DS_MAX = (0.2, 0.5, 1.0, 2.0)
+ACCURACY = 1e-9
+
+
+def line(label, n, auto, mine):
+    left, ratios = f"{'-':>8} {'-':>6} {'-':>7}", f"{'-':>6} {'-':>6}"
+    if auto is not None:
+        left = f"{auto[0] * 1e3:8.1f} {auto[1]:6d} {auto[0] / auto[1] * 1e3:7.3f}"
+        ratios = f"{auto[0] / mine[0]:6.2f} {auto[0] / auto[1] / mine[0] * mine[1]:6.2f}"
+    print(f"{label:34} {n:3d} | {left} | {mine[0] * 1e3:8.1f} {mine[1]:6d} {mine[0] / mine[1] * 1e3:7.3f} | {ratios}")
+
+
+def equal_settings(name, system, auto, window, intervals, degree, repeats):
+    """Same NTST, NCOL and tolerance; AUTO with its usual DSMAX and with the best one, we with our own steps and as many."""
+    ours = partial(our_run, system, "Omega", window, intervals, degree, adaptive=False)
+    wanted = ours()[2]
+    runs = [None if auto is None else partial(auto, window, intervals, degree, ds) for ds in DS_MAX]
+    *theirs, mine, default = least([*runs, ours, partial(our_run, system, "Omega", window, 20, 5)], repeats)
+    line(f"{name}: AUTO at DSMAX {DS_MAX[0]}", system.n, theirs[0], mine)
+    good = [(got, ds) for got, ds in zip(theirs, DS_MAX) if got is not None and agree(got[2], wanted)]
+    if good:
+        fastest, ds = min(good, key=lambda pair: pair[0][0])
+        line(f"{name}: AUTO at its best DSMAX {ds}", system.n, fastest, mine)
+        line(f"{name}: that, and our default mesh", system.n, fastest, default)
+    if theirs[0] is not None and theirs[0][1] > mine[1]:
+        ds_max = 0.2 * mine[1] / theirs[0][1]
+        while ours(ds_max=ds_max)[1] < 0.9 * theirs[0][1]:
+            ds_max *= 0.8
+        many = least([partial(ours, ds_max=ds_max), runs[0]], repeats)
+        line(f"{name}: steps as short as AUTO's", system.n, many[1], many[0])
+    print(f"{'':34} ours", *(f"{kind} {value:.10f}" for kind, value in mine[2]))
+    if theirs[0] is not None:
+        print(f"{'':34} AUTO", *(f"{kind} {value:.10f}" for kind, value in theirs[0][2]))
+
+
+def equal_accuracy(name, system, auto, window, repeats):
+    """The cheapest settings of either side that give every special point to ACCURACY, and our defaults."""
+    reference = our_run(system, "Omega", window, 60 if system.n < 10 else 40, 7, tolerance=1e-11, adaptive=False)[2]
+    if not reference:
+        return
+    meshes = [(N, m) for m in (4, 5, 6, 7) for N in (10, 14, 20, 28, 40, 57, 80)]
+
+    def cheapest(run, choices):
+        """(seconds, settings) of the fastest run that is good enough; for each degree the coarsest good mesh."""
+        best, done = None, set()
+        for choice in choices:
+            if choice[1:] in done:
+                continue
+            got = run(*choice)
+            if agree(got[2], reference, ACCURACY):
+                done.add(choice[1:])
+                best = min(best, (got[0], choice)) if best else (got[0], choice)
+        return best
+
+    mine = cheapest(lambda N, m: our_run(system, "Omega", window, N, m, adaptive=False), meshes)
+    settings = [(N, m, ds, eps) for m in (4, 5, 7) for ds in DS_MAX for eps in (1e-7, 1e-9) for N in (20, 28, 40, 57, 80)]
+    if auto is not None and system.n > 4:  # seconds a run: only what the smaller cases chose
+        settings = [(N, m, ds, 1e-9) for m in (4, 5) for ds in (0.5, 2.0) for N in (20, 28, 40, 57)]
+    theirs = None if auto is None else cheapest(lambda N, m, ds, eps: auto(window, N, m, ds, eps), settings)
+    calls = [
+        None if theirs is None else partial(auto, window, *theirs[1]),
+        None if mine is None else partial(our_run, system, "Omega", window, *mine[1], adaptive=False),
+        partial(our_run, system, "Omega", window, 20, 5),
+    ]
+    their_best, our_best, default = least(calls, repeats)
+    if our_best is not None:
+        line(f"{name}: special points to {ACCURACY:g}", system.n, their_best, our_best)
+    line(f"{name}: that, and our defaults", system.n, their_best, default)
+    print(f"{'':34} AUTO (NTST, NCOL, DSMAX, EPS) {theirs and theirs[1]} error {their_best and worst(their_best[2], reference):.0e};"
+          f" ours {mine and mine[1]} error {our_best and worst(our_best[2], reference):.0e}, defaults error "
+          f"{worst(default[2], reference):.0e}")  # fmt: skip
+
+
+COLD = """
+import time; start = time.process_time()
+import stability as st
+from stability.errors import StabilityWarning
+branch = st.continuation(st.Collocation(st.models.duffing(xi=0.02, beta=0.001)), "Omega", (0.3, 3.0))
+print(time.process_time() - start)
+"""
+
+
+def cold():
+    """Seconds of a first branch in a new process: nothing on disk, kernels on disk; AUTO's compiler, linker and run."""
+    with tempfile.TemporaryDirectory() as name:
+        environment = {**os.environ, "NUMBA_CACHE_DIR": name}
+        for what in ("kernels to be compiled first", "kernels on disk"):
+            done = subprocess.run([sys.executable, "-c", COLD], env=environment, capture_output=True, text=True)
+            print(f"cold, {what}: {float(done.stdout):.2f} s")
+    system = st.models.duffing(xi=0.02, beta=0.001)
+    problem, params = st.Collocation(system), system.parameter_vector(Omega=0.3)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
+    with auto_program(system, problem.view(problem.start(params), params), "Omega") as auto:
+        if auto is not None:
+            auto((0.3, 3.0), 50, 4)
+            print(f"cold, AUTO: {resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before:.2f} s")
+
+
 def main(names):
-    print("compilation and first solve, s:", end=" ")
-    start = time.perf_counter()
-    first = st.Collocation(duffing(0.001))
-    first.start(first.system.parameter_vector())
-    print(f"{time.perf_counter() - start:.2f} (warm disk cache unless this was the first run ever)")
-    print(f"{'case':9} {'states':>6} | {'AUTO ms':>8} {'points':>6} {'ms/pt':>7} | {'ours ms':>8} {'points':>6} {'ms/pt':>7} | "
-          f"{'run':>5} {'step':>5}  Newton it, linearise, spectrum in us")  # fmt: skip
+    print(f"{'case':34}   n | {'AUTO ms':>8} {'points':>6} {'ms/pt':>7} | {'ours ms':>8} {'points':>6} {'ms/pt':>7} | "
+          f"{'run':>6} {'step':>6}   (AUTO over ours)")  # fmt: skip
     for name in names:
+        if name == "cold":
+            cold()
+            continue
         make, window, intervals, degree, repeats = CASES[name]
         system = make()
         params = system.parameter_vector(Omega=window[0])
         problem = st.Collocation(system)
-        orbit = problem.view(problem.start(params), params)
-        auto = auto_run(system, orbit, "Omega", window, intervals, degree, repeats)
-        for label, keywords in ((name, dict(adaptive=False)), (" default", None)):
-            if keywords is None:
-                mine = ours(system, "Omega", window, 20, 5, repeats)
-            else:
-                mine = ours(system, "Omega", window, intervals, degree, repeats, **keywords)
-            costs = kernel_cost(system, *((20, 5) if keywords is None else (intervals, degree)), params)
-            left = f"{'-':>8} {'-':>6} {'-':>7}"
-            ratios = f"{'-':>5} {'-':>5}"
-            if auto is not None:
-                left = f"{auto[0] * 1e3:8.1f} {auto[1]:6d} {auto[0] / auto[1] * 1e3:7.3f}"
-                ratios = f"{auto[0] / mine[0]:5.1f} {auto[0] / auto[1] / mine[0] * mine[1]:5.2f}"
-            print(f"{label:9} {system.n:6d} | {left} | {mine[0] * 1e3:8.1f} {mine[1]:6d} {mine[0] / mine[1] * 1e3:7.3f} | "
-                  f"{ratios}  {costs[0]:.0f} {costs[1]:.0f} {costs[2]:.0f}")  # fmt: skip
-            print("          ours:", "  ".join(f"{s.label} {s.params['Omega']:.10f}" for s in mine[2].special))
-        if auto is not None:
-            kinds = {1: "BP", 2: "BP", 5: "LP", 6: "BP", 7: "PD", 8: "TR"}
-            print("          AUTO:", "  ".join(f"{kinds[abs(k) % 10]} {x:.10f}" for k, x in auto[2]))
+        with auto_program(system, problem.view(problem.start(params), params), "Omega") as auto:
+            equal_settings(name, system, auto, window, intervals, degree, repeats)
+            equal_accuracy(name, system, auto, window, repeats)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or list(CASES))
+    warnings.simplefilter("ignore", StabilityWarning)
+    main(sys.argv[1:] or [*CASES, "cold"])
