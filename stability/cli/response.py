@@ -29,6 +29,8 @@ FORMATS = (*PICTURES, ".npz", ".csv")
 @click.option("--born", is_flag=True, help="Also the branches that are born at branch points and period doublings.")
 @click.option("--start", type=SETTING, multiple=True, help="State in which sweeps start, as theta=0.01; repeatable.")
 @click.option("--step", type=float, help="Step of the sweeps; by default a hundredth of the range.")
+@click.option("--data", type=click.Path(path_type=Path, exists=True, dir_okay=False),
+              help="A measured response (text with named columns and units), laid over the methods.")
 @click.option("-o", "--output", "outputs", type=click.Path(path_type=Path), multiple=True,
               help="File to write (.png .svg .pdf .npz .csv); repeatable.")
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
@@ -38,7 +40,7 @@ def command(
     console: Console, model: str, parameter: str, window: tuple[float, float], methods: str,
     pairs: tuple[tuple[str, Any], ...], quantity: str | None, resonance: tuple[int, int] | None,
     small: tuple[tuple[str, int], ...], born: bool, start: tuple[tuple[str, Any], ...], step: float | None,
-    outputs: tuple[Path, ...], force: bool,
+    data: Path | None, outputs: tuple[Path, ...], force: bool,
 ) -> int:  # fmt: skip
     """The response of MODEL by several methods, with folds and errors side by side.
 
@@ -46,18 +48,20 @@ def command(
 
     \b
     stability response duffing --parameter Omega --range 0.3:3 --method averaging,hb3,hb9,collocation,sweep -o r.png
+    stability response duffing.from_physical --parameter frequency --range 20:29 --data shaker.csv -o r.png
     stability response autoparametric_pendulum --parameter Omega --range 0.9:1.1 --resonance 2:1 --born
         --quantity theta.max --method averaging,averaging2,collocation -o r.npz
     """
     chosen, first = settings(pairs), settings(start)
     check_outputs(outputs, FORMATS, force)
     with console.working(f"responses of {model}") as tell:
-        from .. import responses
+        from .. import load_response, responses
         from ._models import system_from
 
         found = responses(
             system_from(model, chosen), parameter, window, [m.strip() for m in methods.split(",") if m.strip()],
             quantity=quantity, born=born, resonance=resonance, small=dict(small) or None, x0=first or None, step=step,
+            measured=None if data is None else load_response(data),
             progress=lambda method: tell(f"responses of {model}: {method}"),
         )  # fmt: skip
     if not len(found):

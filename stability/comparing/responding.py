@@ -32,6 +32,7 @@ from ..problems.shooting import Shooting
 from ..problems.switching import switch
 from ..results.branch import Branch
 from ..results.comparison import Comparison, Difference
+from ..results.measured import MeasuredResponse
 from ..results.responses import Responses
 from ..results.sweep import Sweep
 from ..simulation.sweeping import sweep
@@ -66,6 +67,7 @@ def responses(
     small: Any = None,
     x0: Any = None,
     step: float | None = None,
+    measured: MeasuredResponse | None = None,
     progress: Callable[[str], Any] | None = None,
 ) -> Responses:
     """The response of a forced oscillator over one parameter by several methods, and how far they are apart.
@@ -93,6 +95,8 @@ def responses(
         Where sweeps start (a pendulum exactly at rest stays there).
     step : float, optional
         Step of the sweeps; by default a hundredth of the window.
+    measured : MeasuredResponse, optional
+        A measurement along the same parameter (`load_response`), laid over the reference like the methods.
     progress : callable, optional
         Called with each method as it begins.
 
@@ -137,6 +141,8 @@ def responses(
         except StabilityError as error:
             failures[word] = error
         seconds[word] = time.perf_counter() - begun
+    if measured is not None:
+        results["measured"], seconds["measured"] = measured, 0.0
     return Responses(_compared(results, failures, parameter, quantity, points), failures, seconds)
 
 
@@ -208,7 +214,7 @@ def _compared(
     results: dict[str, Any], failures: dict[str, StabilityError], parameter: str, quantity: str | None, points: int
 ) -> Comparison:
     """All results that have the quantity, laid over the reference; what has not goes to `failures`."""
-    branches = sorted((w for w in results if not isinstance(results[w], Sweep)), key=_rank)
+    branches = sorted((w for w in results if isinstance(results[w], tuple)), key=_rank)
     while branches:
         reference = branches[0]
         try:
@@ -234,4 +240,4 @@ def _compared(
 
 def _swept(results: dict[str, Any]) -> str:
     """The fundamental amplitude of the first state, where there are sweeps only."""
-    return next((f"{result.states[0]}.amplitude(1)" for result in results.values()), "")
+    return next((f"{result.states[0]}.amplitude(1)" for result in results.values() if isinstance(result, Sweep)), "")

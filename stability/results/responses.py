@@ -15,6 +15,7 @@ from ..words import Kind
 from .branch import Branch
 from .bundles import packed, unpacked
 from .comparison import Comparison, distinct, swept
+from .measured import MeasuredResponse
 from .storage import register, write, write_columns
 from .sweep import Sweep
 
@@ -26,7 +27,7 @@ _HEAD = ("median", "largest", "missing", "more", "time")
 @register("responses")
 @dataclass(frozen=True, eq=False, repr=False)
 class Responses(Mapping[str, Any]):
-    """Responses by method; what `responses` returns. A mapping of method to its branches, or its sweep.
+    """Responses by method; what `responses` returns. A mapping of method to its branches, its sweep, the measurement.
 
     Attributes
     ----------
@@ -80,8 +81,9 @@ class Responses(Mapping[str, Any]):
     def _row(self, method: str) -> dict[str, Any]:
         result, name = self[method], self.parameter
         row: dict[str, Any] = {"method": method, "seconds": self.seconds[method]}
-        if isinstance(result, Sweep):
-            row["jumps"] = [jump.parameter for jump in result.jumps]
+        if not isinstance(result, tuple):
+            row["points"] = len(result)
+            row["jumps"] = [jump.parameter for jump in result.jumps] if isinstance(result, Sweep) else []
         else:
             points = [p for b in result for p in b.special]
             row["folds"] = distinct([p.params[name] for p in points if p.kind is Kind.FOLD])
@@ -138,14 +140,16 @@ class Responses(Mapping[str, Any]):
         names = ("method", "branch", self.parameter, self.quantity, "verdict")
         columns: dict[str, list[Any]] = {name: [] for name in names}
         for method, result in self.items():
-            for k, curve in enumerate((result,) if isinstance(result, Sweep) else result):
+            for k, curve in enumerate(result if isinstance(result, tuple) else (result,)):
                 values, words = self._read(curve)
                 parts = ([method] * len(curve), [k] * len(curve), curve.parameter.tolist(), values, words)
                 for name, part in zip(names, parts):
                     columns[name] += part
         return {name: np.array(column) for name, column in columns.items()}
 
-    def _read(self, curve: Branch | Sweep) -> tuple[list[float], list[str]]:
+    def _read(self, curve: Branch | Sweep | MeasuredResponse) -> tuple[list[float], list[str]]:
+        if isinstance(curve, MeasuredResponse):
+            return curve.values(self.quantity).tolist(), ["measured"] * len(curve)
         if isinstance(curve, Sweep):
             return swept(curve, self.quantity).tolist(), ["settled" if s else "unsettled" for s in curve.settled]
         return curve.columns[self.quantity].tolist(), [str(v) for v in curve.verdicts]
@@ -162,8 +166,8 @@ class Responses(Mapping[str, Any]):
     def to_storage(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """Header and arrays for `results.storage.write`."""
         c = self.comparison
-        shapes = [None if isinstance(curve, Sweep) else len(curve) for curve in c.curves]
-        curves = [part for curve in c.curves for part in ((curve,) if isinstance(curve, Sweep) else curve)]
+        shapes = [len(curve) if isinstance(curve, tuple) else None for curve in c.curves]
+        curves = [part for curve in c.curves for part in (curve if isinstance(curve, tuple) else (curve,))]
         parts, arrays = packed([*curves, *c.differences.values()])
         header = {
             "reference": c.reference, "quantity": c.quantity, "parameter": c.parameter_name, "names": list(c.names),
@@ -187,6 +191,8 @@ class Responses(Mapping[str, Any]):
 
 def _places(row: Mapping[str, Any]) -> str:
     """Folds with the errors of those that have a partner in the reference; the jumps of a sweep."""
+    if row["method"] == "measured":
+        return f"{row['points']} points"
     if "jumps" in row:
         shown = [f"jump {place:.6g}" for place in row["jumps"][:3]]
         more = len(row["jumps"]) - len(shown)

@@ -66,6 +66,17 @@ def test_a_method_that_fails_is_reported_and_the_others_are_written(
     assert main([*arguments, "--method", "averaging"]) == 2
 
 
+def test_measured_data_beside_the_methods(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "shaker.csv").write_text("frequency [Hz]; amplitude [mm]\n24,0; 3,32\n25,0; 3,66\n26,0; 3,99\n")
+    arguments = ["response", "duffing.from_physical", "--parameter", "frequency", "--range", "20:29"]
+    assert main([*arguments, "--method", "collocation", "--data", "shaker.csv", "-o", "r.png", "--json"]) == 0
+    rows = {row["method"]: row for row in json.loads(capsys.readouterr().out)["methods"]}
+    assert rows["measured"]["matched"] == 3 and rows["measured"]["largest_error"] < 0.01
+    (folder / "bad.csv").write_text("frequency [Hz]; amplitude [mm]\n24,0; x\n")
+    assert main([*arguments, "--method", "collocation", "--data", "bad.csv"]) == 2
+    assert main([*arguments, "--method", "collocation", "--data", "none.csv"]) == 2
+
+
 MISTAKES = {
     "no such method": ([*PLAIN, "--method", "colocation"], "did you mean 'collocation'"),
     "no harmonics": ([*PLAIN, "--method", "hb0"], "hb0"),

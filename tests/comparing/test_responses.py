@@ -138,6 +138,36 @@ def test_stored_and_read_again(duffing, tmp_path):
         st.load(tmp_path / "bad.npz")
 
 
+def test_a_measurement_beside_the_methods(tmp_path):
+    """Points planted on the collocation branch, 1 % too high: that is the error that the table shows, stored and read."""
+    system = st.models.duffing.from_physical()
+    branch = st.continuation(st.Collocation(system), "frequency", (24, 26))
+    places = np.array([24.25, 25.0, 25.75])
+    tops = np.array([max(o.amplitude(1)["y"] for o in branch.at(frequency=f)) for f in places])
+    seen = st.MeasuredResponse("frequency", places, {"y.amplitude": 1.01 * tops})
+    found = st.responses(system, "frequency", (24, 26), ("hb5", "collocation"), measured=seen, points=3)
+    errors = found.comparison["measured"].errors
+    assert errors == pytest.approx(0.01 * tops / tops.max(), rel=1e-6)
+    found.save(tmp_path / "r.npz")
+    again = st.load(tmp_path / "r.npz")
+    assert again.table() == found.table() and "3 points" in again.table()
+    assert np.array_equal(again["measured"].parameter, places)
+    other = st.MeasuredResponse("Omega", places, {"y.amplitude": tops})
+    failed = st.responses(system, "frequency", (24, 26), ("collocation",), measured=other, points=3).failures
+    assert "runs along Omega" in str(failed["measured"])
+
+
+def test_families_are_compared_as_they_are_returned():
+    """Two families of an open resonance by two methods: three solutions above the fold of the lower family in both."""
+    system = st.models.duffing(xi=0.02, beta=0.05)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", st.errors.StabilityWarning)
+        both = [st.families(p, "Omega", (1.0, 2.0), places=0) for p in (st.Collocation(system), st.HarmonicBalance(system, harmonics=11))]
+    difference = st.compare(*both, points=5)["harmonic balance 11"]
+    assert difference.parameter.size == 1 * 2 + 3 * 3 and not difference.missing and not difference.extra
+    assert difference.worst < 1e-6 and difference.folds[0][0] == pytest.approx(1.416368134, abs=2e-9)
+
+
 CASES = {
     "autonomous": (lambda: st.responses(st.models.van_der_pol(), "mu", (0.1, 1)), InputError, "autonomous.*Collocation"),
     "parameter": (lambda: st.responses(st.models.duffing(), "omega", (0.3, 3)), UnknownNameError, "did you mean 'Omega'"),
