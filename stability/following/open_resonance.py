@@ -30,7 +30,7 @@ __all__ = ["warn_if_open"]
 
 Array = NDArray[np.float64]
 Balance = Callable[[float, float], tuple[float, float, float]]
-_DECADES, _STEPS = 4.0, 40
+_DECADES, _STEPS = 4.0, 16
 _ANGLES, _PHASES = 48, 8
 
 
@@ -138,11 +138,11 @@ def _on_backbone(balance: Balance, a: float, guess: float) -> float | None:
     x = guess
     for _ in range(40):
         gap, step = balance(a, x)[0], 1e-6
-        slope = (balance(a, x * (1 + step))[0] - balance(a, x * (1 - step))[0]) / (2 * step)
+        slope = (balance(a, x * (1 + step))[0] - gap) / step
         if not (math.isfinite(gap) and math.isfinite(slope)) or slope == 0:
             return None
         change = max(-0.5, min(0.5, -gap / slope))
         x *= math.exp(change)
-        if abs(change) < 1e-8:
+        if abs(change) < 1e-6:
             return x
     return None
