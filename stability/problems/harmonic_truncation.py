@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 __all__ = ["Correction", "adapted", "correction", "missing_harmonics"]
 
 Array = np.ndarray
+_EARLY = 0.1
 _MODERATE = 63  # harmonics that adaption grows to before it believes that the decay is a slow one
 _FAR = 1000  # largest number of missing harmonics that is extrapolated to
 _MOST_SAMPLES = 32  # per harmonic
@@ -171,7 +172,7 @@ def adapted(
         fields["harmonics"] = harmonics
     elif not problem.fixed_samples and found.aliasing > max(_ALIAS * found.error, _ROUNDING):
         fields |= {"samples": 2 * problem.samples} if problem.samples < _MOST_SAMPLES * harmonics else {}
-    if not problem.adaptive or harmonics == problem.harmonics:
+    if not problem.adaptive or harmonics <= problem.harmonics:
         warn_of_truncation(problem, replace(found, error=worst), params)
     if not fields:
         return None
@@ -189,15 +190,15 @@ def _carried(old: HarmonicBalance, new: HarmonicBalance, u: Array) -> Array:
 
 def _wanted_harmonics(problem: HarmonicBalance, found: Correction) -> int:
     H, accuracy = problem.harmonics, problem.accuracy
-    if found.error > accuracy:
-        more = max(missing_harmonics(found, 0.3 * accuracy), 1)
+    if found.error > _EARLY * accuracy:  # adaption comes every few points: it must be ahead of the error
+        more = max(missing_harmonics(found, 0.3 * _EARLY * accuracy), 1)
         # where the decay says that even `most` will not do (a kink), a moderate number is as good
         highest = problem.most if H + more <= problem.most else min(problem.most, max(_MODERATE, H))
         return min(highest, H + min(more, max(H, 2)))
     tail = np.cumsum(found.sizes[::-1])[::-1]  # tail[k]: harmonics above k
-    enough = int(np.argmax(np.append(tail, 0.0) < 1e-2 * accuracy))
+    enough = int(np.argmax(np.append(tail, 0.0) < 0.1 * _EARLY * accuracy))
     lower = max(enough, problem.fewest, math.ceil(2 * H / 3), 1)
-    return lower if lower < H - 1 and found.error < 1e-2 * accuracy else H
+    return lower if lower < H - 1 and found.error < 0.1 * _EARLY * accuracy else H
 
 
 def warn_of_truncation(problem: HarmonicBalance, found: Correction, params: Array) -> None:
