@@ -25,14 +25,15 @@ __all__ = ["DONE", "NOT_FINITE", "STEP_TOO_SMALL", "TOO_MANY_STEPS", "advance", 
 
 DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, NOT_FINITE, NO_ROOM = 0, 1, 2, 3, 4
 _NODES = method.C
-# rows behind the stages: the step, its two errors, the dense output. They and 0, 1 are entries of an array because an
-# integer literal as an argument is a type of its own for numba, which compiles the helper once more for it.
+# rows behind the stages: the step, its two errors (the second: what it has beyond the step), the dense output. They are
+# entries of an array because an integer literal as an argument is a type of its own for numba, which compiles the
+# helper once more for it.
 _BEHIND, _FIRST = np.array([16, 17, 18, 19]), np.array([0, 1])
 
 
 def _quads() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(stages, weights, number) of the non-zero weights of each row, four at a time; the last four padded by zeros."""
-    rows = [*method.A, method.B, method.E5, method.E3, *method.D]
+    rows = [*method.A, method.B, method.E5, method.E3 - method.B, *method.D]
     places, weights, counts = np.zeros((len(rows), 4, 4), np.int64), np.zeros((len(rows), 4, 4)), []
     for r, row in enumerate(rows):
         used = np.flatnonzero(row)
@@ -51,6 +52,22 @@ def _between(x, low, high):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
+def _exchange(z, line, inward):  # type: ignore[no-untyped-def]
+    """Between z (n, 1 + k) and a line of the state followed by the variations, rows behind each other.
+
+    In a line the variations are read in the same blocks as they were written, which processors do without a stall.
+    """
+    n, columns = z.shape
+    for a in range(n):
+        for k in range(columns):
+            place = a if k == 0 else n + a * (columns - 1) + k - 1
+            if inward == 1:
+                line[place] = z[a, k]
+            else:
+                z[a, k] = line[place]
+
+
+@kernel(inline=True)
 def _combine(row, h, start, K, out):  # type: ignore[no-untyped-def]
     """out = start + h sum_i w_i K_i with the weights of a row of the method."""
     for e in range(out.shape[0]):
@@ -63,92 +80,94 @@ def _combine(row, h, start, K, out):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _slope(field, P, sigma, phase, z, which, sigma_p, F, J, Fp, x, K, i):  # type: ignore[no-untyped-def]
-    """K_i = d(x, V)/ds at z (n (1 + k),); state a at a (1 + k), its variations behind it."""
-    n, count, m = x.shape[0], which.shape[0], P.shape[0]
-    columns = count + 1
+def _slope(field, P, sigma, phase, x, V, which, sigma_p, F, J, Fp, K, i):  # type: ignore[no-untyped-def]
+    """K_i = d(x, V)/ds at x (n,), V (n, k). An unsigned index cannot be negative: no wrapping, no gathered loads."""
+    n, count = V.shape
     phase[0] -= math.floor(phase[0])
-    for a in range(n):
-        x[a] = z[a * columns]
     call_field(field, 1, phase, x, P, 0, F, J, Fp)
     for a in range(n):
-        at = a * columns
-        K[i, at] = sigma * F[a]
-        if count == 0:
-            continue
+        K[i, a] = sigma * F[a]
+        at = n + a * count
         for k in range(count):
-            K[i, at + 1 + k] = sigma_p[k] * F[a]
+            K[i, np.uint64(at + k)] = sigma_p[k] * F[a]
+        for k in range(count):
             if which[k] >= 0:
-                K[i, at + 1 + k] += sigma * Fp[a * m + which[k]]
-        for b in range(n):
-            factor = sigma * J[a * n + b]
+                K[i, np.uint64(at + k)] += sigma * Fp[a, which[k]]
+        for b in range(n if count > 0 else 0):
+            factor = sigma * J[a, b]
             if factor != 0.0:
                 for k in range(count):
-                    K[i, at + 1 + k] += factor * z[b * columns + 1 + k]
+                    K[i, np.uint64(at + k)] += factor * V[b, k]
 
 
 @kernel(inline=True)
-def _error(five, three, z, new, rtol, atol, P, which):  # type: ignore[no-untyped-def]
-    """Scaled error of the step from its two estimates: the larger one of the state's and the variations'.
+def _state_error(five, three, x, new, rtol, atol):  # type: ignore[no-untyped-def]
+    """Scaled error of the state from its two estimates."""
+    square, other = 0.0, 0.0
+    for a in range(atol.shape[0]):
+        before, after = abs(x[a]), abs(new[a])
+        scale = atol[a] + rtol * (after if after > before else before)
+        square += (five[a] / scale) ** 2
+        other += (three[a] / scale) ** 2
+    return _scaled(square, other, atol.shape[0])
+
+
+@kernel(inline=True)
+def _scaled(square, other, count):  # type: ignore[no-untyped-def]
+    """The error from sums of squares; nan stays nan."""
+    total = square + 0.01 * other
+    return square / math.sqrt(total * count) if total != 0.0 else 0.0
+
+
+@kernel(inline=True)
+def _variation_error(five, three, V, x, rtol, atol, P, which):  # type: ignore[no-untyped-def]
+    """Scaled error of the variations V (n, k) at x from their two estimates.
 
     A variation is held to rtol of its own largest entry; a derivative by a parameter p need not be better than what a
     relative change of p by one makes of the state's tolerance (where it is zero, its rounding is all there is).
     """
-    n, count = atol.shape[0], which.shape[0]
-    columns = count + 1
-    worst, square, other = 0.0, 0.0, 0.0
-    for k in range(columns):
+    n, count = V.shape
+    square, other = 0.0, 0.0
+    for k in range(count):
         size, floor = 0.0, 0.0
-        if k > 0:
-            for a in range(n):
-                value = abs(new[a * columns + k]) / atol[a]
-                size = value if value > size else size
-            if which[k - 1] >= 0 and P[which[k - 1]] != 0.0:
-                floor = 1.0 / abs(P[which[k - 1]])
         for a in range(n):
-            e = a * columns + k
-            before, after = abs(z[a * columns]), abs(new[a * columns])
-            scale = atol[a] + rtol * (after if k > 0 or after > before else before)
-            if k > 0:
-                least = rtol * atol[a] * size + 1e-300
-                scale = scale * floor if scale * floor > least else least
-            square += (five[e] / scale) ** 2
-            other += (three[e] / scale) ** 2
-        if k == 0 or k == count:
-            total = square + 0.01 * other
-            if total > 0.0:
-                value = square / math.sqrt(total * (n if k == 0 else n * count))
-                worst = value if value > worst else worst
-            elif total != 0.0:
-                return np.nan
-            square, other = 0.0, 0.0
-    return worst
+            value = abs(V[a, k]) / atol[a]
+            size = value if value > size else size
+        if which[k] >= 0 and P[which[k]] != 0.0:
+            floor = 1.0 / abs(P[which[k]])
+        for a in range(n):
+            scale, least = floor * (atol[a] + rtol * abs(x[a])), rtol * atol[a] * size + 1e-300
+            scale = scale if scale > least else least
+            square += (five[a, k] / scale) ** 2
+            other += (three[a, k] / scale) ** 2
+    return _scaled(square, other, n * count)
 
 
 @kernel(inline=True)
-def _first_step(field, P, sigma, rate, s, span, z, which, sigma_p, F, J, Fp, x, phase, K, work, rtol, atol):  # type: ignore[no-untyped-def]
-    """The step whose Taylor term of order 8 has the tolerance's size, judged by an Euler step (Hairer et al., II.4)."""
-    n, columns = atol.shape[0], which.shape[0] + 1
-    d0, d1, d2 = 0.0, 0.0, 0.0
-    for a in range(n):
-        scale = atol[a] + rtol * abs(z[a * columns])
-        d0, d1 = d0 + (z[a * columns] / scale) ** 2, d1 + (K[0, a * columns] / scale) ** 2
-    d0, d1 = math.sqrt(d0 / n), math.sqrt(d1 / n)
-    h = 0.01 * d0 / d1 if d0 > 1e-5 and d1 > 1e-5 else 1e-3 * span
-    h = h if h < 0.1 * span else 0.1 * span
-    for e in range(work.shape[0]):
-        work[e] = z[e] + h * K[0, e]
-    phase[0] += rate * h
-    _slope(field, P, sigma, phase, work, which, sigma_p, F, J, Fp, x, K, _FIRST[1])
-    for a in range(n):
-        scale = atol[a] + rtol * abs(z[a * columns])
-        d2 += ((K[1, a * columns] - K[0, a * columns]) / scale) ** 2
-    d2 = math.sqrt(d2 / n) / h
-    d2 = d2 if d2 > d1 else d1
+def _first_step(x, K, h, rtol, atol):  # type: ignore[no-untyped-def]
+    """The step whose Taylor term of order 8 has the tolerance's size, from the slopes at the ends of an Euler step h.
+
+    Reference: Hairer et al., section II.4.
+    """
+    d1, d2 = 0.0, 0.0
+    for a in range(atol.shape[0]):
+        scale = atol[a] + rtol * abs(x[a])
+        d1 += (K[0, a] / scale) ** 2
+        d2 += ((K[1, a] - K[0, a]) / (scale * h)) ** 2
+    d2 = math.sqrt((d2 if d2 > d1 else d1) / atol.shape[0])
     better = (0.01 / d2) ** 0.125 if d2 > 1e-15 else 1e-3 * h
-    if not better < 100.0 * h:
-        better = 100.0 * h
-    return better if better < 0.1 * span else 0.1 * span
+    return better if better < 100.0 * h else 100.0 * h
+
+
+@kernel(inline=True)
+def _euler_step(x, K, rtol, atol, span):  # type: ignore[no-untyped-def]
+    """A hundredth of |x| / |x'| in units of the tolerance."""
+    d0, d1 = 0.0, 0.0
+    for a in range(atol.shape[0]):
+        scale = atol[a] + rtol * abs(x[a])
+        d0, d1 = d0 + (x[a] / scale) ** 2, d1 + (K[0, a] / scale) ** 2
+    h = 0.01 * math.sqrt(d0 / d1) if d0 > 1e-10 and d1 > 1e-10 else 1e-3 * span
+    return _between(h, 0.0, 0.1 * span)
 
 
 @kernel
@@ -156,23 +175,31 @@ def advance(  # type: ignore[no-untyped-def]
     field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps, dense, steps, times,
     coefficients,
 ):  # fmt: skip
-    """Advance z (n (1 + k),) in place from s to `end` > s: (status, s reached, last h, steps).
+    """Advance z (n, 1 + k) in place from s to `end` > s: (status, s reached, last h, steps).
 
     The field is never evaluated beyond low and high. dense = 1 keeps the steps from number `steps` on in times and
     coefficients, as `integrate` describes, and ends with NO_ROOM when these are full.
     """
-    n, flat = atol.shape[0], z.shape[0]
-    columns = which.shape[0] + 1
-    K, work, new, zero = np.zeros((16, flat)), np.empty(flat), np.empty(flat), np.zeros(flat)
-    five, three = np.empty(flat), np.empty(flat)
-    F, J, Fp, x, phase = np.empty(n), np.empty(n * n), np.empty(n * P.shape[0]), np.empty(n), np.empty(1)
+    n, count = z.shape[0], which.shape[0]
+    size, shape = n * (1 + count), (n, count)
+    flat = (size + 7) // 8 * 8  # filled up with zeros: the processor takes eight at a time
+    K, lines, phase = np.zeros((16, flat)), np.zeros((6, flat)), np.empty(1)
+    line, work, new, zero, five, three = lines[0], lines[1], lines[2], lines[3], lines[4], lines[5]
+    F, J, Fp = np.empty(n), np.empty((n, n)), np.empty((n, P.shape[0]))
+    V = work[n:size].reshape(shape)
+    _exchange(z, line, _FIRST[1])
+    for e in range(flat):
+        work[e] = line[e]
     rejected, status, last = False, TOO_MANY_STEPS, 16 if dense == 1 else 13
     phase[0] = phase0 + rate * _between(s, low, high)
-    _slope(field, P, sigma, phase, z, which, sigma_p, F, J, Fp, x, K, _FIRST[0])
+    _slope(field, P, sigma, phase, work, V, which, sigma_p, F, J, Fp, K, _FIRST[0])
     if h <= 0.0:
-        h = _first_step(
-            field, P, sigma, rate, s, end - s, z, which, sigma_p, F, J, Fp, x, phase, K, work, rtol, atol
-        )  # fmt: skip
+        h = _euler_step(line, K, rtol, atol, end - s)
+        for e in range(flat):
+            work[e] = line[e] + h * K[0, e]
+        phase[0] += rate * h
+        _slope(field, P, sigma, phase, work, V, which, sigma_p, F, J, Fp, K, _FIRST[1])
+        h = _between(_first_step(line, K, h, rtol, atol), 0.0, 0.1 * (end - s))
     for _ in range(max_steps):
         if dense == 1 and steps == coefficients.shape[0]:
             status = NO_ROOM
@@ -181,18 +208,25 @@ def advance(  # type: ignore[no-untyped-def]
             h = end - s
         error = 0.0
         for i in range(1, last):  # stage 12 is the slope at the end of the step, known to be good before it is taken
-            _combine(i, h, z, K, work)
-            if i == 12:
-                _combine(_BEHIND[0], h, z, K, new)
+            if i != 12:
+                _combine(i, h, line, K, work)
+            else:
+                _combine(_BEHIND[0], h, zero, K, work)
                 _combine(_BEHIND[1], h, zero, K, five)
-                _combine(_BEHIND[2], h, zero, K, three)
-                error = _error(five, three, z, new, rtol, atol, P, which)
+                _combine(_BEHIND[2], h, work, K, three)
+                for e in range(flat):
+                    work[e] += line[e]
+                    new[e] = work[e]
+                error = _state_error(five, three, line, new, rtol, atol)
+                if count > 0:
+                    other = _variation_error(
+                        five[n:size].reshape(shape), three[n:size].reshape(shape), V, new, rtol, atol, P, which
+                    )
+                    error = other if not other <= error else error
                 if not error < 1.0:
                     break
-                for e in range(flat):
-                    work[e] = new[e]
             phase[0] = phase0 + rate * _between(s + _NODES[i] * h, low, high)
-            _slope(field, P, sigma, phase, work, which, sigma_p, F, J, Fp, x, K, i)
+            _slope(field, P, sigma, phase, work, V, which, sigma_p, F, J, Fp, K, i)
         factor = 0.9 * error ** (-0.125) if error > 0.0 else 6.0
         if not error < 1.0:
             h *= _between(factor if error < np.inf else 0.1, 0.1, 1.0)
@@ -202,36 +236,36 @@ def advance(  # type: ignore[no-untyped-def]
                 break
             continue
         if dense == 1:
-            _keep(h, z, new, K, columns, zero, five, coefficients, steps)
+            _keep(h, line, new, K, zero, five, coefficients, steps)
             times[steps + 1] = s + h
         steps += 1
         finished = h == end - s
         s = end if finished else s + h
         for e in range(flat):
-            z[e] = new[e]
+            line[e] = new[e]
             K[0, e] = K[12, e]
         if finished:
             status = DONE
             break
         h *= _between(factor, 0.333, 1.0 if rejected else 6.0)
         rejected = False
+    _exchange(z, line, _FIRST[0])
     return status, s, h, steps
 
 
 @kernel(inline=True)
-def _keep(h, z, new, K, columns, zero, work, coefficients, q):  # type: ignore[no-untyped-def]
+def _keep(h, z, new, K, zero, work, coefficients, q):  # type: ignore[no-untyped-def]
     """The eight coefficients of the dense output of step q."""
     for a in range(coefficients.shape[2]):
-        e = a * columns
-        change = new[e] - z[e]
-        coefficients[q, 0, a] = z[e]
+        change = new[a] - z[a]
+        coefficients[q, 0, a] = z[a]
         coefficients[q, 1, a] = change
-        coefficients[q, 2, a] = h * K[0, e] - change
-        coefficients[q, 3, a] = 2.0 * change - h * (K[12, e] + K[0, e])
+        coefficients[q, 2, a] = h * K[0, a] - change
+        coefficients[q, 3, a] = 2.0 * change - h * (K[12, a] + K[0, a])
     for r in range(4):
         _combine(_BEHIND[3] + r, h, zero, K, work)
         for a in range(coefficients.shape[2]):
-            coefficients[q, 4 + r, a] = work[a * columns]
+            coefficients[q, 4 + r, a] = work[a]
 
 
 def integrate(
@@ -251,12 +285,12 @@ def integrate(
     n, low, high, room = len(z), s + inside, end - inside, 64 * dense
     times, coefficients = np.empty(room + 1), np.empty((room, 8, n))
     times[0] = s
-    line, steps, status = z.reshape(-1), 0, NO_ROOM
+    steps, status = 0, NO_ROOM
     while status == NO_ROOM:
         if dense and steps == len(coefficients):
             times, coefficients = np.resize(times, 2 * steps + 1), np.resize(coefficients, (2 * steps, 8, n))
         status, s, h, steps = advance(
-            field, P, sigma, phase0, rate, low, high, s, end, line, which, sigma_p, rtol, atol, h, max_steps - steps,
+            field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps - steps,
             dense, steps, times, coefficients,
         )  # fmt: skip
     return status, s, h, steps, times[: steps * dense + 1], coefficients[: steps * dense]

@@ -24,7 +24,7 @@ def _near(z, points, owners, scale, wraps, tolerance):  # type: ignore[no-untype
     for k in range(points.shape[0]):
         inside = True
         for a in range(z.shape[0]):
-            gap = z[a] - points[k, a]
+            gap = z[a, 0] - points[k, a]
             if wraps[a]:
                 gap -= 2.0 * np.pi * np.round(gap / (2.0 * np.pi))
             if not abs(gap) <= tolerance * scale[a]:
@@ -44,10 +44,10 @@ def assign(field, P, rate, cuts, inside, X, periods, points, owners, scale, wrap
     """
     count, n = X.shape
     which, sigma = np.zeros(0, np.int64), np.zeros(0)
-    z, times, steps = np.empty(n), np.empty(1), np.empty((0, 8, n))
+    z, times, steps = np.empty((n, 1)), np.empty(1), np.empty((0, 8, n))
     for i in range(count):
         for a in range(n):
-            z[a] = X[i, a]
+            z[a, 0] = X[i, a]
         labels[i] = UNDECIDED
         h, row, last = 0.0, 0, UNDECIDED
         for _ in range(periods):
@@ -69,4 +69,4 @@ def assign(field, P, rate, cuts, inside, X, periods, points, owners, scale, wrap
                 labels[i] = now
                 break
         for a in range(n):
-            X[i, a] = z[a]
+            X[i, a] = z[a, 0]
