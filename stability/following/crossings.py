@@ -14,6 +14,7 @@ turns by more than a right angle without growing, f has a pole instead: no cross
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from ..words import Kind
 from .locating import Found, Locator
 from .points import Point
 
-__all__ = ["crossing"]
+__all__ = ["crossing", "interpolated_zero"]
 
 Array = NDArray[np.float64]
 _OFFSETS = (-1.0, -0.6, -0.3, 0.3, 0.6, 1.0)
@@ -36,26 +37,40 @@ def crossing(locator: Locator, a: Point, b: Point, answer: Array, after: Array) 
     """The crossing between a and b, whose answers are given; None where f has a pole or the curve is lost."""
     size = float(np.linalg.norm(answer))
     ends = (1 / size, size / float(answer @ after))
+    made = interpolated_zero(locator, a, b, lambda z: _inverse(answer, size, z), ends)
+    if made is None:
+        return None
+    return Found(made[0], Kind.BRANCH_POINT, (a.parameter, b.parameter), made[1] ** 2)
+
+
+def interpolated_zero(
+    locator: Locator, a: Point, b: Point, f: Callable[[Point], float | None], ends: tuple[float, float]
+) -> tuple[Point, float] | None:
+    """(point, arclength by which it moved last) where f vanishes between a and b, by interpolation around it.
+
+    For zeros at which the curve itself cannot be solved for. None where f is larger there than at the ends (a pole).
+    """
     x, accuracy = ends[0] / (ends[0] - ends[1]), math.inf
     samples: list[tuple[Point, float]] = []
     for width in _WIDTHS:
         samples = []
         for at in [x + width * offset for offset in _OFFSETS]:
             z = locator.on_curve(a, b, at) if 0.02 < at < 0.98 else None
-            value = None if z is None else _inverse(answer, size, z)
+            value = None if z is None else f(z)
             if z is not None and value is not None:
                 samples.append((z, value))
         samples += [] if len(samples) >= _FEWEST else [(a, ends[0]), (b, ends[1])]
         samples.sort(key=lambda sample: sample[0].s)
-        root = _root([z.s for z, _ in samples], [f for _, f in samples])
-        if root is None or max(abs(f) for _, f in samples) > 2 * max(map(abs, ends)):
+        root = _root([z.s for z, _ in samples], [value for _, value in samples])
+        if root is None or not a.s < root < b.s or max(abs(value) for _, value in samples) > 2 * max(map(abs, ends)):
             return None
         accuracy, x = abs((root - a.s) / (b.s - a.s) - x) * (b.s - a.s), (root - a.s) / (b.s - a.s)
     point = _interpolated(samples, a.s + x * (b.s - a.s), locator.k)
-    residual = point.problem.residual_at(point.u, point.params)  # type: ignore[attr-defined]
-    if not residual < _LOOSE:
+    try:
+        residual = point.problem.residual_at(point.u, point.params)  # type: ignore[attr-defined]
+    except np.linalg.LinAlgError:
         return None
-    return Found(point._replace(residual=residual), Kind.BRANCH_POINT, (a.parameter, b.parameter), accuracy**2)
+    return (point._replace(residual=residual), accuracy) if residual < _LOOSE else None
 
 
 def _inverse(answer: Array, size: float, z: Point) -> float | None:

@@ -13,7 +13,7 @@ from itertools import pairwise
 from typing import Any
 
 from ..words import Kind
-from .crossings import crossing
+from .crossings import crossing, interpolated_zero
 from .locating import Found, Locator
 from .points import Point
 
@@ -44,7 +44,7 @@ class Monitor:
                 if gq != 0 and not gp * gq < 0:
                     continue
                 # a knot may lie on the zero itself: the middle of a segment that is symmetric about it
-                point = q if gq == 0 else locator.zero(p, q, exact, gp, gq)
+                point = q if gq == 0 else _located(locator, p, q, exact, (gp, gq))
                 named = _named(kind, point, p, q, max(abs(gp), abs(gq)))
                 # two functions may vanish at one point: both rates do at a cusp
                 found += [f for f in named if all(f.kind is not g.kind or f.bracket != g.bracket for g in found)]
@@ -63,6 +63,15 @@ class Monitor:
             answer = after
         self._answer = (knots[-1].u, answer)
         return found
+
+
+def _located(locator: Locator, p: Point, q: Point, function: Any, ends: tuple[float, float]) -> Point | None:
+    """The zero between p and q; by interpolation where the curve is singular there."""
+    point = locator.zero(p, q, function, *ends)
+    if point is None and hasattr(p.problem, "residual_at"):
+        made = interpolated_zero(locator, p, q, function, ends)
+        point = None if made is None else made[0]
+    return point
 
 
 def _named(kind: Kind, point: Point | None, p: Point, q: Point, scale: float) -> list[Found]:

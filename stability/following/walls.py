@@ -71,6 +71,8 @@ def _at_end(
     found = last.problem.correct(u, params, settings.name, None, 0.0, settings.tolerance)
     if not found.converged or found.tangent is None:
         return f"at the end of the window: {found.note}"
+    if any(not low <= found.u[place] <= high for place, low, high in _walls(last.problem)):
+        return ""  # the other wall comes first
     slope, weight, w = found.tangent, settings.weight, last.problem.weights
     size = math.sqrt(dot(w, slope.u, slope.u) + weight**2)
     side = dot(w, slope.u, last.tangent.u) + weight**2 * last.tangent.parameter

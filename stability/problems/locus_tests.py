@@ -9,7 +9,8 @@ the product pi over pairs of the values that are not critical, lambda_i + lambda
     Hopf              omega^2 -> Bogdanov-Takens;  product of the others -> zero-Hopf;  pi -> double Hopf;
                       first Lyapunov coefficient -> generalized Hopf
     period doubling   chi'(-1) -> resonance 1:2;  chi(1) -> fold-flip;  cubic coefficient -> generalized period doubling
-    Neimark-Sacker    c - 1, c + 1, c + 1/2, c -> resonances 1:1, 1:2, 1:3, 1:4 (c = cos theta);  d -> Chenciner
+    Neimark-Sacker    c - 1, c + 1, c + 1/2, c -> resonances 1:1, 1:2, 1:3, 1:4 (c = cos theta; c may touch +-1 and turn
+                      back: dc/ds);  d -> Chenciner
     on half a period  chi'(-1), c^2 - 1, c + 1/2, c -> resonances 1:1, 1:1, 1:3, 1:2 of the whole one
 
 chi' at the critical value is a symmetric function of all values, smooth where two of them meet (each of them alone is
@@ -45,8 +46,10 @@ __all__ = ["confirmed", "monitors"]
 
 Complex = NDArray[np.complex128]
 _STILL = 1e-4  # scaled rate of both parameters at a cusp
+_TOUCHED = 1e-5  # distance of cos(theta) from its limit where it touches
 _STILL_JUMP = 1e-2  # the same where the tangent is not known: folds of doubled orbits that shrink to the simple one
-_NOISE = 1e-9  # a scaled rate below this is rounding: the parameter is constant along the curve
+_STRAIGHT = 1e-10  # a second difference below this part of lambda_2's scale is rounding: it is constant
+_NOISE = 1e-7  # a scaled rate below this is rounding: the parameter is constant along the curve
 _ASIDE = 1e-3  # arclength to the neighbours that tell the sign of a second derivative
 
 
@@ -73,7 +76,11 @@ def _second(point: Any) -> float:
     return float(point.problem.parts(point.tangent.u)[1]) / float(point.problem.scale)
 
 
-_TURNS, _EXTREMA = Rate(_first), Rate(_second)
+def _third(point: Any) -> float:
+    return float(point.problem.parts(point.tangent.u)[2][0])
+
+
+_TURNS, _EXTREMA, _TOUCHES = Rate(_first), Rate(_second), Rate(_third)
 
 
 def monitors(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
@@ -100,7 +107,7 @@ def _by_kind(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
         )  # fmt: skip
     if curve.kind is Kind.NEIMARK_SACKER:
         resonances = ((Kind.R1, 1.0), (Kind.R2, -1.0), (Kind.R3, -0.5), (Kind.R4, 0.0))
-        return (*((kind, _extra(c)) for kind, c in resonances), (Kind.CHENCINER, _coefficient))
+        return (*((kind, _extra(c)) for kind, c in resonances), (Kind.CHENCINER, _coefficient), (Kind.R2, _TOUCHES))
     return ()
 
 
@@ -123,6 +130,8 @@ def confirmed(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None
     """The kind of a located zero, or None: nothing. `scale`: largest modulus of the function at the bracket's ends."""
     if kind in (Kind.FOLD, Kind.EXTREMUM):
         return _extreme(curve, kind, sharpened(point), scale)
+    if kind in (Kind.R1, Kind.R2):
+        return _resonance(curve, kind, point, scale)
     function = dict(monitors(curve)).get(kind)
     if function is None:
         return kind
@@ -150,21 +159,41 @@ def _extreme(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
         return Kind.CUSP
     if jumps:
         return None
-    if kind is Kind.FOLD or curve.kind is not Kind.FOLD:
+    if kind is Kind.FOLD:
         return kind
-    sign = _hessian_sign(curve, point)
+    bend = _bend(curve, point)
+    if bend is None or abs(bend) < _STRAIGHT * curve.scale:
+        return None
+    if curve.kind is not Kind.FOLD:
+        return kind
+    sign = _hessian_sign(curve, point, bend)
     return Kind.EXTREMUM if not sign else Kind.ISOLA_CENTRE if sign > 0 else Kind.ISOLA_MERGER
 
 
-def _hessian_sign(curve: Locus, point: Any) -> int:
-    """Sign of h_xx h_11 - h_x1^2 (see the head of this file); 0: not found."""
+def _resonance(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
+    """1:1 and 1:2: a root of c -+ 1 or of chi', or c touching -+1 (two oscillators that do not know of each other)."""
+    if curve.kind is not Kind.NEIMARK_SACKER:
+        value = dict(_by_kind(curve))[kind](point)
+        return kind if math.isfinite(value) and abs(value) <= 1e-3 * scale else None
+    c = float(curve.parts(point.u)[2][0])
+    if min(abs(c - 1), abs(c + 1)) > _TOUCHED:
+        return None
+    return Kind.R1 if c > 0 else Kind.R2
+
+
+def _bend(curve: Locus, point: Any) -> float | None:
+    """Second difference of lambda_2 along the curve."""
     ends = []
     for step in (-_ASIDE, _ASIDE):
         found = curve.correct(point.u, point.params, curve.along, point.tangent, step, 1e-11)
         if not found.converged:
-            return 0
+            return None
         ends.append(curve.parts(found.u)[1])
-    bend = ends[0] - 2 * curve.parts(point.u)[1] + ends[1]
+    return ends[0] - 2 * curve.parts(point.u)[1] + ends[1]
+
+
+def _hessian_sign(curve: Locus, point: Any, bend: float) -> int:
+    """Sign of h_xx h_11 - h_x1^2 (see the head of this file); 0: not found."""
     try:
         L = ExtendedLinearisation.at(curve, point.u, point.params, curve.along)
         w, v = np.real(L.begun.frame.left[:, 0]), np.real(L.begun.frame.right[:, 0])

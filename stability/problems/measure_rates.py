@@ -75,7 +75,7 @@ def sensitivity(
     """
     if isinstance(problem, SpecialPoint):
         if start is not None or params:
-            raise InputError("a special point has its own solution and parameters: sensitivity(point, of) is all it takes")
+            raise InputError("a special point brings its own solution and parameters: sensitivity(point, of)")
         return problem.sensitivity(of)  # type: ignore[no-any-return]
     names = list(problem.parameters)
     check_names("parameter", params, names, "this problem")
