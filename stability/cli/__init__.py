@@ -24,6 +24,7 @@ __all__ = ["main"]
 # command -> one line of help; the module stability.cli.<command> holds it under the name `command`
 COMMANDS: dict[str, str] = {
     "average": "The slow flow by averaging or multiple scales, as text or LaTeX.",
+    "basins": "Which steady motion every start of a grid comes to.",
     "chart": "Stability chart (instability tongues) over two parameters.",
     "continue": "Follow a branch of solutions, with its special points.",
     "demo": "A guided tour: writes figures and prints a table.",
@@ -33,7 +34,7 @@ COMMANDS: dict[str, str] = {
     "response": "A response by several methods on one axes, with folds and errors side by side.",
     "simulate": "Motion in time from given initial values.",
     "sweep": "Response along a slow sweep, as on a shaker.",
-    "plot": "Draw a stored chart, branch or orbit.",
+    "plot": "Draw a stored chart, branch, sweep or orbit, measured data over it.",
 }
 _FILES = {"continue": "continuation"}  # a keyword of Python is no name of a module
 

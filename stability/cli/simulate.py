@@ -112,10 +112,16 @@ def _document(
     }
 
 
+def _unit(run: Trajectory, name: str) -> str:
+    unit = run.units.get(name, "")
+    return f" {unit}" if unit and unit != "1" else ""
+
+
 def _report(console: Console, document: dict[str, Any], run: Trajectory) -> None:
     rows = [
-        ("time", f"{run.span[0]:g} to {run.span[1]:.8g}, {run.steps} steps, {document['seconds']:.3f} s; {run.status}"),
-        *((name, f"{v['min']:.8g} to {v['max']:.8g}") for name, v in document["values"].items()),
+        ("time", f"from {run.span[0]:g} to {run.span[1]:.8g}: {run.status}"),
+        *((name, f"{v['min']:.8g} to {v['max']:.8g}{_unit(run, name)}") for name, v in document["values"].items()),
+        ("steps", f"{run.steps}, computed in {document['seconds']:.2f} s"),
     ]
     if run.period is not None:
         left, multiple = run.transient

@@ -157,12 +157,15 @@ def _report(console: Console, document: dict[str, Any], runs: list[Sweep]) -> No
     rows = []
     for one, run in zip(document["sweeps"], runs):
         way = f"{run.name} {run.window[0]:g} to {run.window[1]:g}"
+        known = [run.units.get(name, "") for name in (run.states[0], run.name)]
+        units = [f" {unit}" if unit not in ("", "1") else "" for unit in known]
         rows.append((way, f"{one['points']} points, {one['settled']} settled, {one['status']}"))
         largest = one["largest"]
-        rows.append(("largest", f"max {largest['state']} = {largest['max']:.8g} at {run.name} = {largest['at']:.8g}"))
+        rows.append(("largest", f"max {largest['state']} = {largest['max']:.6g}{units[0]} at {largest['at']:.8g}{units[1]}"))
         for jump in run.jumps:
             before, after = (side[run.states[0]][1] for side in (jump.before, jump.after))
-            rows.append(("jump", f"at {run.name} = {jump.parameter:.8g}: max {before:.6g} -> {after:.6g}"))
+            place = f"at {jump.parameter:.8g}{units[1]}"
+            rows.append(("jump", f"{place}: max {run.states[0]} {before:.6g} -> {after:.6g}{units[0]}"))
     rows.append(("time", f"{document['seconds']:.2f} s"))
     console.table(rows)
     for path in document["written"]:

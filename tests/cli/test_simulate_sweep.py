@@ -87,3 +87,21 @@ def test_sweep_keeps_a_result(tmp_path, capsys):
 def test_refusals(arguments, said, capsys):
     assert main(arguments) == 2
     assert said in capsys.readouterr().err
+
+
+def test_basins(tmp_path, capsys):
+    """The numbers of the function; picture, table and data; shares on the terminal."""
+    grid = ["--set", "frequency=25", "--x", "y:-6e-3:6e-3", "--y", "y_dot:-0.8:0.8", "--shape", "12x10"]
+    picture, table, stored = (tmp_path / f"b.{ending}" for ending in ("png", "csv", "npz"))
+    files = [part for path in (picture, table, stored) for part in ("-o", str(path))]
+    code, found = document(capsys, "basins", "duffing.from_physical", *grid, *files)
+    own = st.basins(
+        st.models.duffing.from_physical(frequency=25.0), x=("y", -6e-3, 6e-3), y=("y_dot", -0.8, 0.8), shape=(12, 10)
+    )
+    assert code == 0 and [a["share"] for a in found["attractors"]] == [a.share for a in own.attractors]
+    assert np.array_equal(st.load(stored).labels, own.labels) and picture.stat().st_size > 4000
+    assert np.genfromtxt(table, delimiter=",", names=True)["attractor"].tolist() == own.labels.ravel().tolist()
+    assert main(["basins", "duffing.from_physical", *grid]) == 0
+    assert "repeats after 1 period; y = " in capsys.readouterr().out
+    assert main(["basins", "lorenz", "--x", "x:0:1", "--y", "y:0:1"]) == 2
+    assert "autonomous" in capsys.readouterr().err
