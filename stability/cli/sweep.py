@@ -161,7 +161,8 @@ def _report(console: Console, document: dict[str, Any], runs: list[Sweep]) -> No
         units = [f" {unit}" if unit not in ("", "1") else "" for unit in known]
         rows.append((way, f"{one['points']} points, {one['settled']} settled, {one['status']}"))
         largest = one["largest"]
-        rows.append(("largest", f"max {largest['state']} = {largest['max']:.6g}{units[0]} at {largest['at']:.8g}{units[1]}"))
+        top = f"max {largest['state']} = {largest['max']:.6g}{units[0]}"
+        rows.append(("largest", f"{top} at {largest['at']:.8g}{units[1]}"))
         for jump in run.jumps:
             before, after = (side[run.states[0]][1] for side in (jump.before, jump.after))
             place = f"at {jump.parameter:.8g}{units[1]}"
