@@ -64,6 +64,36 @@ def test_a_curve_of_special_points(folder: Path, capsys: pytest.CaptureFixture[s
     assert (folder / "c.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_going_on_from_a_saved_branch(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The same Hopf curve from the file of the branch, ended at sigma = 8 and 15; a born branch from the same file."""
+    arguments = ["continue", "lorenz", "--parameter", "rho", "--range", "15:30", "-o", "saved.npz"]
+    assert main([*arguments, "--start", "x=6", "--start", "y=6", "--start", "z=14"]) == 0
+    curve = ["continue", "saved.npz", "--locus", "HB1", "--free", "sigma", "--free-range", "8:15", "--json"]
+    assert main([*curve, "-o", "curve.npz", "-o", "curve.svg"]) == 0
+    out = capsys.readouterr().out
+    assert len(json.loads(out[out.index("{") :])["branches"]) == 2
+    found = st.load("curve.npz")
+    rho, sigma = found.columns["rho"], found.columns["sigma"]
+    assert np.allclose(rho, sigma * (sigma + 17 / 3) / (sigma - 11 / 3), rtol=1e-10, atol=0)
+    assert sorted((sigma[0], sigma[-1])) == [8.0, 15.0]
+    assert main(curve[:-1]) == 0
+    assert "sigma = 10" in capsys.readouterr().out
+    assert main(["continue", "saved.npz", "--switch", "HB1", "--range", "22:26"]) in (0, 1)
+    assert "Branch rho 22 -> 26" in capsys.readouterr().out
+
+
+def test_a_saved_branch_asks_where_to_go_on(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*LORENZ, "-o", "saved.npz"]) == 0
+    wrong = {
+        "--switch LABEL": [], "only": ["--set", "beta=1", "--switch", "BP1"],
+        "'rho'": ["--parameter", "sigma", "--switch", "BP1"], "window of --free": ["--free-range", "1:2"],
+    }  # fmt: skip
+    for words, options in wrong.items():
+        capsys.readouterr()
+        assert main(["continue", "saved.npz", *options]) == 2
+        assert words in capsys.readouterr().err
+
+
 def test_report_names_the_points(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(LORENZ) == 0
     assert "BP1  rho = 1  branch point" in capsys.readouterr().out
@@ -154,6 +184,7 @@ MISTAKES = {
     "no such point": ([*LORENZ, "--switch", "PD1"], "PD1"),
     "nothing is born there": ([*DUFFING, "--switch", "LP1"], "LP1"),
     "no second parameter": ([*LORENZ, "--locus", "BP1"], "--free"),
+    "no parameter": (["continue", "duffing"], "--parameter"),
     "no such second parameter": ([*LORENZ, "--locus", "BP1", "--free", "sigm"], "did you mean 'sigma'"),
     "equilibria of a forced system": ([*DUFFING, "--method", "equilibrium"], "Collocation"),
     "format": ([*LORENZ, "-o", "a.txt"], ".npz"),
