@@ -43,6 +43,7 @@ _ADAPT_EVERY = 3
 _GROWTH = 1e6
 _STALL_POINTS, _STALL, _STALL_LENGTH = 8, 1e-8, 0.05
 _PATIENCE = 6
+_BEYOND_GRAZING = "the orbit grazes a stop, what lies beyond has other impacts: go on by switch"
 _ONE = 1e-7  # two events nearer to each other than this are one
 
 
@@ -302,7 +303,8 @@ class Follower(Iterator[Point]):
             self.entries.append(Entry(point, one._replace(point=point)))
             if returned or self._named_stop(one) or one.kind is Kind.GRAZING:
                 self.status = Status.CLOSED_LOOP if returned else Status.STOPPED
-                self.note = "" if returned else f"at the {one.kind} that was to stop it"
+                ends = _BEYOND_GRAZING if one.kind is Kind.GRAZING else f"at the {one.kind} that was to stop it"
+                self.note = "" if returned else ends
                 self.before, self.last = None, point
                 return True
         if found and found[0].point.s < self.last.s:  # seen late: it belongs before the last point
