@@ -227,3 +227,21 @@ def test_cuts_change_nothing(branches, segments):
     knocking = st.continuation(st.switch(quiet["GR1"]), "Omega", (0.85, 1.05))
     assert abs(quiet["GR1"].params["Omega"] - grazing_frequencies()[0]) < 1e-10
     assert knocking["PD1"].params["Omega"] == pytest.approx(branches[2]["PD1"].params["Omega"], abs=1e-9)
+
+
+def test_impacts_wander_through_the_whole_period():
+    """Excitation 25 cos(t + psi): psi only shifts the orbit in time, so its impact passes every phase, t = 0 too."""
+    u, psi = sp.Function("u")(t), sp.Symbol("psi", real=True)
+    system = st.System.from_equations(
+        {u.diff(t, 2): -0.1 * u.diff(t) - u + 1.3 * sp.cos(1.3 * t + psi)}, [u], parameters=dict(psi=0.0),
+        period=2 * sp.pi / sp.Float("1.3", 30), stops=[st.HardStop("u", 0.6, 1, 0.8)],
+    )  # fmt: skip
+    branch = st.continuation(st.Shooting(system), "psi", (0.0, 4 * np.pi), start=dict(u=0.0, u_dot=-2.0))
+    assert branch.status is st.Status.PARAMETER_BOUND and branch.columns["impacts"].max() >= 1
+    for name in ("impact_speed.max", "u.min", "u_dot.max"):
+        assert np.ptp(branch.columns[name]) < 1e-8 * np.abs(branch.columns[name]).max()
+    assert np.abs(branch.values - branch.values[0]).max() < 1e-6
+    origins = {round(problem.origin, 6) for problem in branch._problems}
+    assert len(origins) > 2
+    turned = st.solve(st.Shooting(system), start=dict(u=0.0, u_dot=-2.0), psi=1.0)
+    assert turned.min["u"] == pytest.approx(branch.columns["u.min"][0], rel=1e-9)
