@@ -18,6 +18,7 @@ from .locating import Found, chord_length
 from .loops import Home
 from .points import Point, dot, rescaled, smooth_tests
 from .settings import Settings
+from .sharpening import sharpened
 from .walking import Walk, ended
 from .walls import on_wall
 
@@ -148,7 +149,7 @@ def assemble(
     notes: tuple[str, str] | None = None,
 ) -> Branch:
     """The branch that these entries are; `notes` say why it ended on either side, by default what the followers say."""
-    entries = _without_twins(_merged(entries))
+    entries = [sharpened(settings, e) for e in _without_twins(_merged(entries))]
     special, marks = _labelled(settings, entries)
     points = [e.point for e in entries]
     meshes: dict[int, Any] = {}

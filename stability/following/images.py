@@ -19,6 +19,7 @@ from ..words import Status
 from .follower import Entry, Follower
 from .points import Point, dot, smooth_tests
 from .settings import Settings
+from .sharpening import sharpened
 
 __all__ = ["with_images"]
 
@@ -47,17 +48,18 @@ class _Images:
 def with_images(birth: Entry, half: Follower) -> tuple[list[Entry], Status]:
     """All entries of the branch, and the status of both of its ends."""
     status, images = half.status or Status.STOPPED, _Images()  # under way: stopped
+    entries = [sharpened(half.settings, e) for e in half.entries]
     ends_in_pitchfork = status is Status.CLOSED_LOOP and half.entries and half.entries[-1].found is not None
     if ends_in_pitchfork:
-        last = _exactly(half.settings, half.entries[-1])
+        last = _exactly(half.settings, entries[-1])
         end = last.point.s
-        back = [images.entry(e, 2 * end - e.point.s) for e in reversed(half.entries[:-1])]
+        back = [images.entry(e, 2 * end - e.point.s) for e in reversed(entries[:-1])]
         closing = Entry(birth.point._replace(s=2 * end), None)
-        return [birth, *half.entries[:-1], last, *back, closing], status
+        return [birth, *entries[:-1], last, *back, closing], status
     if status is Status.CLOSED_LOOP:  # it has come round by itself
-        return [birth, *half.entries], status
-    front = [images.entry(e, -e.point.s) for e in reversed(half.entries)]
-    return [*front, birth, *half.entries], status
+        return [birth, *entries], status
+    front = [images.entry(e, -e.point.s) for e in reversed(entries)]
+    return [*front, birth, *entries], status
 
 
 def _exactly(settings: Settings, entry: Entry) -> Entry:

@@ -56,6 +56,18 @@ def test_the_same_orbits(pair):
             assert a.verdict is b.verdict
 
 
+def test_special_points_are_as_accurate_as_the_branch():
+    """At F = 5 the second pitchfork comes where the mesh has fallen behind: it is located again on a better one."""
+    usual, fine = (
+        st.continuation(st.Collocation(duffing(5.0), symmetry="auto", accuracy=accuracy), "omega", (2.0, 0.8))
+        for accuracy in (1e-9, 1e-12)
+    )
+    assert usual.labels == fine.labels == ("BP1", "BP2")
+    for p, q in zip(usual.special, fine.special):
+        assert p.solution.error < 3e-9
+        assert p.params["omega"] == pytest.approx(q.params["omega"], abs=1e-8)
+
+
 @pytest.mark.parametrize(
     ("values", "name", "window", "number"),
     [
