@@ -144,8 +144,12 @@ class Walk(Iterator[Step]):
     def run(self) -> Walk:
         """Go on to the end; an interrupt from the keyboard ends the walk and keeps its points."""
         try:
-            for _ in self:
-                pass
+            while (now := self._now) is not None:
+                for _ in now:
+                    pass
+                self._reported[id(now)] = len(now.entries)
+                if self._alone(now) or not self._next_side():
+                    break
         except KeyboardInterrupt:
             now = self._now
             if now is not None:

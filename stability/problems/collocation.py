@@ -297,12 +297,14 @@ class Collocation(OrbitDiscretisation):
         arc, t, t_l, weight = 0, u, 0.0, 0.0
         if tangent is not None:
             arc, t, t_l, weight = 1, _plain(tangent.u), float(tangent.parameter), float(tangent.weight)
-        weights = self.weights if mesh is self.mesh else self.raised_weights
+        weights, stage_weights = self.weights, self.quadrature
+        if mesh is not self.mesh:
+            weights, stage_weights = self.raised_weights, mesh.split(self.raised_weights)[1]
         rule = mesh.rule
         status, iterations, residual, sign, x = kernels.newton(
             kernels.solvers(), self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h,
             rule.inverse, rule.matrix, rule.row_sums, rule.update, self.kept,
-            self.position, self.closure, self.winding, self.scales, weights, mesh.split(weights)[1], params, index, u,
+            self.position, self.closure, self.winding, self.scales, weights, stage_weights, params, index, u,
             nodes, stages, work.T, arc, t, mesh.split(t)[1], t_l, weight, float(ds), float(tolerance),
             limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU, work.pivots, work.Z, work.M,
         )  # fmt: skip
@@ -348,8 +350,8 @@ class Collocation(OrbitDiscretisation):
         stage, node = np.empty_like(stages), np.empty_like(nodes)
         residual, sigma = kernels.evaluate(
             self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse, rule.update,
-            self.closure, self.winding, self.scales, params, nodes, stages, work.T, work.F, work.J, work.Fp, work.dT,
-            stage, node,
+            self.closure, self.winding, self.scales, params, _plain(nodes), stages, work.T, work.F, work.J, work.Fp,
+            work.dT, stage, node,
         )  # fmt: skip
         if not (residual < np.inf and np.isfinite(work.J).all()):
             return work, stage, 0.0
@@ -388,14 +390,15 @@ class Collocation(OrbitDiscretisation):
         The error is that by degree m + 1, the trivial multiplier's distance from 1, and Liouville's gap together.
         """
         M, error = linearisation.spectral, 0.0
-        if not np.isfinite(M).all():
+        largest = float(np.abs(M).max())
+        if not largest < np.inf:
             return orbit_spectrum(np.full(self.mesh.n - self.mesh.own, np.nan, complex), np.inf)
         if self.mesh.own:
             direction = self._direction_of_flow(linearisation)
             M, error = deflated(M, direction)
         values = eigenvalues(M)
         error += multiplier_error(self, linearisation, values, direction if self.mesh.own else None)
-        error += 1e-15 * float(np.abs(M).max()) * len(M)
+        error += 1e-15 * largest * len(M)
         factors = linearisation.work.M
         if self.halved:
             factors = np.concatenate([factors, self.closure[None]])  # S^-1 = S

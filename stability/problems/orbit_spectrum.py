@@ -73,13 +73,14 @@ def contracted(values: Array, factors: Array) -> Array:
     Eigenvalues of a product that has been multiplied out are known to rounding of the largest only; the periodic QR
     algorithm on the factors (N, n, n) knows them all. `values` may lack the trivial multiplier.
     """
-    size = np.abs(values)
-    small = size < 1e-10 * max(1.0, float(size.max(initial=0.0)))
-    if not small.any():
+    size = [abs(z) for z in values.tolist()]
+    limit = 1e-10 * max(1.0, *size) if size else 0.0
+    count = sum(one < limit for one in size)
+    if not count:
         return values
     exact = product_eigenvalues(factors)
     out = values.copy()
-    out[len(values) - int(small.sum()) :] = exact[len(exact) - int(small.sum()) :]
+    out[len(values) - count :] = exact[len(exact) - count :]
     return out
 
 
