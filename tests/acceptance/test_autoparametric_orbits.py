@@ -196,3 +196,27 @@ def test_sets_without_torus_points(length_ratio, mass_ratio):
     swing = st.continuation(st.switch(semi["PD1"]), "Omega", (0.5, 1.6))
     assert {p.kind for p in swing.special} == {st.Kind.FOLD, st.Kind.BRANCH_POINT}
     assert "stable" in {str(o.verdict) for o in swing.at(Omega=1.0)}
+
+
+@pytest.mark.parametrize("sets", [4, pytest.param(40, marks=pytest.mark.slow)])
+def test_random_sets_from_either_end_of_their_instability(sets):
+    """Both period doublings lead to one loop: the same points whichever way round, and nothing unexplained."""
+    rng = np.random.default_rng(7)
+    compared = 0
+    for _ in range(sets):
+        system = st.models.autoparametric_pendulum(
+            xi1=rng.uniform(0.005, 0.04), xi2=rng.uniform(0.003, 0.02), Omega0=rng.uniform(0.45, 0.55),
+            length_ratio=10 ** rng.uniform(0.9, 2.5), mass_ratio_total=rng.uniform(0.05, 0.3),
+        )  # fmt: skip
+        semi = st.continuation(st.Collocation(system), "Omega", (0.5, 1.6))
+        doublings = semi.of_kind(st.Kind.PERIOD_DOUBLING)
+        if len(doublings) != 2:
+            continue  # a deep modulation: both instabilities overlap
+        loops = [st.continuation(st.switch(point), "Omega", (0.4, 1.7)) for point in doublings]
+        assert [loop.status for loop in loops] == [st.Status.CLOSED_LOOP] * 2
+        assert not any(loop.of_kind(st.Kind.UNEXPLAINED) for loop in loops)
+        one, two = (sorted((p.kind.label, p.params["Omega"]) for p in loop.special if not p.name) for loop in loops)
+        assert [kind for kind, _ in one] == [kind for kind, _ in two]
+        np.testing.assert_allclose([at for _, at in one], [at for _, at in two], atol=1e-6)
+        compared += 1
+    assert compared > sets / 2
