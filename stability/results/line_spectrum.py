@@ -92,6 +92,12 @@ class LineSpectrum:
             rows.append(f"{f:14.9g} {a:12.5g} {p:8.3f}  {' '.join(f'{n:+d}' for n in k)}")
         return "\n".join(rows)
 
+    def plot(self, ax: Any = None, **options: Any) -> Any:
+        """Draw the lines, the strongest with their whole numbers."""
+        from ..plots.line_spectra import plot_lines
+
+        return plot_lines(self, ax=ax, **options)
+
     def __repr__(self) -> str:
         words = ", ".join(f"{b:.9g} +- {e:.1g}" for b, e in zip(self.base, self.error)) or "none"
         lines = f"{self.frequency.size} lines | rest {self.residual:.1e}"
@@ -106,7 +112,7 @@ def line_spectrum(trajectory: Any, name: str, most: int = 20) -> LineSpectrum:
     forcing = trajectory.period
     periods = (t1 - t0) / forcing if forcing else None
     if periods is not None and periods < 8:
-        raise InputError(f"frequencies of a motion over {periods:.3g} forcing periods: at least 8 are needed (best 200)")
+        raise InputError(f"frequencies of a motion over {periods:.3g} forcing periods: at least 8 are needed")
     wanted = _PER_PERIOD * periods if periods else 8 * len(trajectory.edges)
     count = int(min(max(wanted, _FEWEST), _MOST))
     dt = (t1 - t0) / count

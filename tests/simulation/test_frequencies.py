@@ -48,6 +48,8 @@ def test_two_tones_and_their_combinations():
         assert found.phase[:3] == pytest.approx([0.3, -1.0, 2.0], abs=1e-6)
         assert np.abs(found.orders @ found.base - found.frequency).max() < 1e-7
         assert found.mean == pytest.approx(0.5, abs=1e-8)
+    artists = found.plot()
+    assert len(artists) == 1 + min(6, found.frequency.size) and artists[1].get_text() == f"({found.orders[0, 0]}, {found.orders[0, 1]})"
     assert "+1 -1" in recorded(signal, 200.0, 0.05, 1.0).frequencies().table()
 
 
