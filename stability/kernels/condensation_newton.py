@@ -168,9 +168,9 @@ def _borders(own, arc, W, h, stage_weights, weight_T, nodes, Y, t_Y, t_T, pull, 
 def _columns(own, arc, free, h, sigma, span, F, Fp, dT, stage, node, columns, node_columns):  # type: ignore[no-untyped-def]
     """Right sides of the linear system: period, parameter, -residual; without an arc the parameter is a right side."""
     at_free, at_rhs = (own, own + 1) if arc == 1 else (own + 1, own)
-    if own == 1:
-        _parameter_column(h, sigma, span, dT, F, Fp, -1, columns, 0)
-    _parameter_column(h, sigma, span, dT, F, Fp, free, columns, at_free)
+    for column in range(own + 1):  # one call: literal arguments would be types of their own and compiled once more
+        which, place = (-1, 0) if column < own else (free, at_free)
+        _parameter_column(h, sigma, span, dT, F, Fp, which, columns, place)
     for j in range(stage.shape[0]):
         for k in range(stage.shape[1]):
             columns[j, k, at_rhs] = -stage[j, k]
@@ -189,11 +189,11 @@ def newton(  # type: ignore[no-untyped-def]
     solvers, field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales, weights,
     stage_weights,
     P, free, u, nodes, Y, T, arc, t, t_Y, t_l, weight_l, ds, tolerance, max_iterations,
-    F, J, Fp, dT, LU, pivots, Z, M,
+    F, J, Fp, dT, LU, pivots, Z, M, x,
 ):  # fmt: skip
     """Correct u = (nodes, Y, period) and P[free] in place; `arc` = 1 with a tangent (t, t_l), 0 without (P stays).
 
-    nodes and Y are views of u, t_Y of t, stage_weights of weights. Returns (status, iterations, residual, sign, x):
+    nodes and Y are views of u, t_Y of t, stage_weights of weights. Returns (status, iterations, residual, sign);
     x[0] is the last correction, x[1] the tangent of the curve, not normalised (without `arc` the derivative by
     P[free]), both as (u, parameter). F, J, Fp, dT, LU, pivots, Z, M hold the last linearisation.
     """
@@ -204,7 +204,6 @@ def newton(  # type: ignore[no-untyped-def]
     rows, node_rows = np.empty((own + arc, intervals, size)), np.empty((own + arc, intervals + 1, n))
     corner, stage, node = np.empty((own + arc, own + 2)), np.empty((intervals, size)), np.empty((intervals + 1, n))
     columns, node_columns = np.empty((intervals, size, own + 2)), np.empty((intervals + 1, n, own + 2))
-    x = np.empty((2, count + arc))
     _borders(own, arc, W, h, stage_weights, weights[last], nodes, Y, t_Y, t[last], pull, rows, node_rows, corner)
     moved = np.zeros((intervals, size))  # from the given stages
     moved_T, moved_l = ds * t[last] * arc, ds * t_l * arc
@@ -260,7 +259,7 @@ def newton(  # type: ignore[no-untyped-def]
         if arc == 1 and iterations > 1 and change > 2.0 * previous:
             break
         previous = change
-    return status, iterations, residual, sign, x
+    return status, iterations, residual, sign
 
 
 @kernel(inline=True)

@@ -297,8 +297,8 @@ def monodromy_product(M):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def summary(M, J, h, b, leading, scales, nodes, Y):  # type: ignore[no-untyped-def]
-    """What a point of a branch is asked for: (M_{N-1} .. M_0, int tr J ds, roughness).
+def summary(M, J, h, b, leading, scales, nodes, Y, product):  # type: ignore[no-untyped-def]
+    """What a point of a branch is asked for: (int tr J ds, roughness), and the product M_{N-1} .. M_0.
 
     The integral by the Gauss weights b; the roughness is the largest m-th derivative over m! of the scaled polynomials,
     whose coefficients are `leading` (see `gauss`).
@@ -314,4 +314,5 @@ def summary(M, J, h, b, leading, scales, nodes, Y):  # type: ignore[no-untyped-d
             for i in range(degree):
                 value += leading[i + 1] * Y[j, i * n + a]
             rough = max(rough, abs(value) / (h[j] ** degree * scales[a]))
-    return monodromy_product(M), trace, rough
+    product[:] = monodromy_product(M)
+    return trace, rough

@@ -301,12 +301,13 @@ class Collocation(OrbitDiscretisation):
         if mesh is not self.mesh:
             weights, stage_weights = self.raised_weights, mesh.split(self.raised_weights)[1]
         rule = mesh.rule
-        status, iterations, residual, sign, x = kernels.newton(
+        x = np.empty((2, mesh.size + arc))
+        status, iterations, residual, sign = kernels.newton(
             kernels.solvers(), self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h,
             rule.inverse, rule.matrix, rule.row_sums, rule.update, self.kept,
             self.position, self.closure, self.winding, self.scales, weights, stage_weights, params, index, u,
             nodes, stages, work.T, arc, t, mesh.split(t)[1], t_l, weight, float(ds), float(tolerance),
-            limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU, work.pivots, work.Z, work.M,
+            limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU, work.pivots, work.Z, work.M, x,
         )  # fmt: skip
         if status != kernels.CONVERGED:
             note = _NOTES.get(status) or self._not_finite(mesh, work)

@@ -219,8 +219,9 @@ class CollocationLinearisation:
         """Phi, int tr J ds, roughness: the largest m-th derivative (over m!) of the solution over its scales."""
         mesh, work = self.mesh, self.work
         nodes, stages, _ = mesh.split(self.solution)
-        product, trace, roughness = summary(
-            work.M, work.J, mesh.h, mesh.rule.weights, mesh.rule.leading, self.problem.scales, nodes, stages
+        product = np.empty((mesh.n, mesh.n))
+        trace, roughness = summary(
+            work.M, work.J, mesh.h, mesh.rule.weights, mesh.rule.leading, self.problem.scales, nodes, stages, product
         )
         return product, float(trace), float(roughness)
 
