@@ -151,3 +151,18 @@ def test_stops_that_overlap_at_rest_and_motions_that_begin_beyond():
         st.simulate(beyond, (0, 1), x0=dict(u=2.0))
     with pytest.raises(InputError, match="beyond"):
         st.sweep(beyond, "Omega", (0.5, 0.7), step=0.1, x0=dict(u=2.0))
+
+
+@pytest.mark.parametrize(("Omega", "base_term", "window", "wanted"), [
+    (1.0, True, (0.0033, 0.0037), 0.00352523), (1.0, False, (0.0033, 0.0037), 0.0035283),
+    (1.5, True, (2.8, 3.0), 2.94635), (1.5, False, (1.25, 1.4), 1.31208),
+])  # fmt: skip
+def test_thresholds_of_figure_13_by_continuation(Omega, base_term, window, wanted):
+    """Where the pendulum at rest loses its stability, in g: the doubling point along the acceleration, all digits given."""
+    system = st.models.autoparametric_pendulum.from_acceleration(
+        xi1=0.021, xi2=0.021, mass_ratio_total=0.2, Omega0=0.5, Omega=Omega, base_term=base_term
+    )
+    branch = st.continuation(st.Collocation(system), "acceleration", window, stop_at="PD1")
+    found = branch["PD1"].params["acceleration"]
+    digits = len(f"{wanted}".split(".")[1])
+    assert abs(found - wanted) <= 0.51 * 10.0**-digits
