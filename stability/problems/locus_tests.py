@@ -172,13 +172,14 @@ def _extreme(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
 
 def _resonance(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
     """1:1 and 1:2: a root of c -+ 1 or of chi', or c touching -+1 (two oscillators that do not know of each other)."""
-    if curve.kind is not Kind.NEIMARK_SACKER:
-        value = dict(_by_kind(curve))[kind](point)
-        return kind if math.isfinite(value) and abs(value) <= 1e-3 * scale else None
-    c = float(curve.parts(point.u)[2][0])
-    if min(abs(c - 1), abs(c + 1)) > _TOUCHED:
+    function = next(f for k, f in _by_kind(curve) if k is kind and f is not _TOUCHES)
+    value, pairs = function(point), curve.kind is Kind.NEIMARK_SACKER
+    if math.isfinite(value) and abs(value) <= (_TOUCHED if pairs else 1e-3) * scale:
+        return kind
+    if not pairs or getattr(curve.inner, "halved", False):
         return None
-    return Kind.R1 if c > 0 else Kind.R2
+    c = float(curve.parts(point.u)[2][0])
+    return None if min(abs(c - 1), abs(c + 1)) > _TOUCHED else Kind.R1 if c > 0 else Kind.R2
 
 
 def _bend(curve: Locus, point: Any) -> float | None:
