@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 
+from ..problems.collocation import Collocation
+from ..problems.collocation_error import carried_errors
 from ..problems.defining import locate
 from ..protocols import Tangent
 from ..words import Kind
@@ -37,16 +39,17 @@ def sharpened(settings: Settings, entry: Entry) -> Entry:
 def _better(settings: Settings, entry: Entry) -> Entry | None:
     """The same special point on an adapted mesh; None where the mesh is good, or nothing was found on a better one."""
     point, found = entry
-    accuracy = getattr(point.problem, "accuracy", None)
-    if found is None or found.kind not in _DEFINED or accuracy is None or not getattr(point.problem, "adaptive", False):
+    old = point.problem
+    if found is None or found.kind not in _DEFINED or not isinstance(old, Collocation) or not old.adaptive:
         return None
-    if not point.problem.error(point.u, point.params) > _WORSE * accuracy:
+    allowed = _WORSE * old.accuracy
+    if carried_errors(old, point.u)[1] <= 3 * allowed or not old.error(point.u, point.params) > allowed:
         return None
-    adapted = point.problem.adapt(point.u, point.params, point.tangent)
+    adapted = old.adapt(point.u, point.params, point.tangent)
     if adapted is None:
         return None
     problem, u, tangent = adapted
-    on_half = found.breaking and getattr(problem, "halved", False)
+    on_half = found.breaking and problem.halved
     kind = Kind.PERIOD_DOUBLING if on_half else found.kind
     spectrum = point.spectrum
     at = locate(problem, kind, u, point.params, settings.name, settings.weight, spectrum.values, radius=_NEAR)
