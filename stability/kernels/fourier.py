@@ -158,6 +158,7 @@ def fourier_basis(harmonics: int, samples: int) -> FourierBasis:
     s = np.arange(N) / N
     double = series(2 * H + 1, s).T * (2.0 / N)
     double[0] *= 0.5
+    double = np.ascontiguousarray(double)
     k = ranks(H)
     swap = np.arange(2 * H + 1)
     swap[1::2], swap[2::2] = np.arange(2, 2 * H + 1, 2), np.arange(1, 2 * H + 1, 2)
@@ -165,7 +166,7 @@ def fourier_basis(harmonics: int, samples: int) -> FourierBasis:
     G = series(H, s)
     slope = np.ascontiguousarray(G[:, swap] * turn)
     first, second = _toeplitz_hankel(H)
-    analysis = np.ascontiguousarray(double[: 2 * H + 1])
+    analysis = double[: 2 * H + 1].copy()
     arrays = (s, G, slope, analysis, k.astype(float), swap, turn, double, first, second)
     for array in arrays:
         array.setflags(write=False)

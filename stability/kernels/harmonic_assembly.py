@@ -62,14 +62,14 @@ def states(G, slope, s, c, omega, layout, X):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _linear(k, order_two, c, e, r, omega, power):  # type: ignore[no-untyped-def]
-    """omega^r D^r c at coefficient e of series r (power 0), or its derivative by omega (power 1), without winding."""
+def _linear(k, order_two, c, e, r, omega):  # type: ignore[no-untyped-def]
+    """omega^r D^r c at coefficient e of series r and its derivative by omega, without winding."""
     if order_two:
-        return -(omega * omega if power == 0 else 2.0 * omega) * k[e] * k[e] * c[e, r]
-    scale = omega if power == 0 else 1.0
+        return -omega * omega * k[e] * k[e] * c[e, r], -2.0 * omega * k[e] * k[e] * c[e, r]
     if e == 0:
-        return 0.0
-    return scale * k[e] * (c[e + 1, r] if e % 2 == 1 else -c[e - 1, r])
+        return 0.0, 0.0
+    turned = c[e + 1, r] if e % 2 == 1 else -c[e - 1, r]
+    return omega * k[e] * turned, k[e] * turned
 
 
 @kernel(inline=True)
@@ -93,8 +93,9 @@ def _residual(tables, layout, work, c, omega, rate, index):  # type: ignore[no-u
         second_order = velocities[r] >= 0
         for e in range(M):
             straight = winding[r] / (2.0 * np.pi) if e == 0 and not second_order else 0.0
-            R[e * q + r] = _linear(k, second_order, c, e, r, omega, 0) + omega * straight - found[e, r]
-            by_omega[e * q + r] = _linear(k, second_order, c, e, r, omega, 1) + straight - found[e, 2 * q + r]
+            value, slope = _linear(k, second_order, c, e, r, omega)
+            R[e * q + r] = value + omega * straight - found[e, r]
+            by_omega[e * q + r] = slope + straight - found[e, 2 * q + r]
             column[e * q + r] = rate * by_omega[e * q + r] - found[e, q + r]
 
 

@@ -205,7 +205,12 @@ def propagate(  # type: ignore[no-untyped-def]
             fundamental[0, a, b] = 1.0 if a == b else 0.0
     total, finite = 0.0, sign != 0.0
     for j in range(S):
-        multiply(M[j], fundamental[j], fundamental[j + 1])
+        for a in range(n):
+            for b in range(n):
+                value = 0.0
+                for e in range(n):
+                    value += M[j, a, e] * fundamental[j, e, b]
+                fundamental[j + 1, a, b] = value
         for i in range(degree):
             for a in range(n):
                 total += widths[j] * weights[i] * J[j * degree + i, a, a]

@@ -136,7 +136,10 @@ def _points(harmonics: int, multiple: int) -> tuple[tuple[Array, ...], Array]:
     G = series(2 * harmonics + 1, s)
     coarse = series(harmonics, np.arange(S) / S).T * (2.0 / S)
     coarse[0] *= 0.5
-    return (s, np.mod(multiple * s, 1.0), G, slope_of(G), np.full(S, 1.0 / S)), np.ascontiguousarray(coarse)
+    coarse, slope = np.ascontiguousarray(coarse), slope_of(G)
+    for array in (s, G, slope, coarse):  # read-only as the basis is: kernels are compiled for one sort of arrays
+        array.setflags(write=False)
+    return (s, np.mod(multiple * s, 1.0), G, slope, np.full(S, 1.0 / S)), coarse
 
 
 def _nodes(problem: HarmonicBalance) -> tuple[Any, ...]:

@@ -76,14 +76,21 @@ def _between(harmonics: int, samples: int, multiple: int) -> tuple[Array, ...]:
     G = series(harmonics, s)
     analysis = series(2 * harmonics + 1, s).T * (2.0 / samples)
     analysis[0] *= 0.5
-    return s, G, slope_of(G), np.ascontiguousarray(analysis), np.mod(multiple * s, 1.0)
+    return _frozen(s, G, slope_of(G), np.ascontiguousarray(analysis), np.mod(multiple * s, 1.0))
 
 
 @lru_cache(maxsize=64)
-def _upper_basis(harmonics: int, samples: int) -> tuple[Array, Array]:
+def _upper_basis(harmonics: int, samples: int) -> tuple[Array, ...]:
     """G and G D (N, 2H + 2) of the harmonics H + 1 .. K at the samples."""
     G, first = series(2 * harmonics + 1, np.arange(samples) / samples), 2 * harmonics + 1
-    return np.ascontiguousarray(G[:, first:]), np.ascontiguousarray(slope_of(G)[:, first:])
+    return _frozen(np.ascontiguousarray(G[:, first:]), np.ascontiguousarray(slope_of(G)[:, first:]))
+
+
+def _frozen(*arrays: Array) -> tuple[Array, ...]:
+    """Read-only, as the basis is: kernels are compiled for one sort of arrays."""
+    for array in arrays:
+        array.setflags(write=False)
+    return arrays
 
 
 def _tables(problem: HarmonicBalance) -> tuple[Any, ...]:
