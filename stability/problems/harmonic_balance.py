@@ -207,16 +207,17 @@ class HarmonicBalance(OrbitDiscretisation):
     @cached_property
     def column_sizes(self) -> Array:
         """(N,) sizes of the unknowns."""
-        sizes = self.layout.repeated(self.scales[self.layout.unknowns])
-        return np.append(sizes.ravel(), [self.period_scale] * self.own)
+        sizes = np.tile(self.scales[self.layout.unknowns], self.layout.count)
+        return np.append(sizes, [self.period_scale] * self.own)
 
     @cached_property
     def row_sizes(self) -> Array:
         """(N,) sizes of the equations: scale times (rate k)^r, with the rate of the problem's own parameters."""
-        period = self.period_scale if self.own else self.orbit_period(self.system.parameter_vector())
-        rate = 2 * np.pi / period
-        order = np.where(self.layout.second, 2, 1)
-        sizes = self.layout.repeated(self.scales[self.layout.unknowns] * rate**order, by_order=True)
+        rate = self._memo.get("rate")
+        if rate is None or self.own:
+            period = self.period_scale if self.own else self.orbit_period(self.system.parameter_vector())
+            rate = self._memo["rate"] = 2 * np.pi / period
+        sizes = self.layout.growth * (self.scales[self.layout.unknowns] * rate**self.layout.order)
         return np.append(sizes.ravel(), [1.0] * self.own)
 
     @property
@@ -256,7 +257,8 @@ class HarmonicBalance(OrbitDiscretisation):
         keep["samples"] = max(keep["samples"] or 0, 4 * fields.get("harmonics", self.harmonics) + 4) or None
         if "harmonics" in fields and not self.fixed_samples:
             keep["samples"] = None
-        made = dataclasses.replace(self, **{**keep, **fields, "_memo": {}})
+        kept = {"rate": self._memo["rate"]} if "rate" in self._memo and "subharmonic" not in fields else {}
+        made = dataclasses.replace(self, **{**keep, **fields, "_memo": kept})
         object.__setattr__(made, "fixed_samples", self.fixed_samples)
         return made
 

@@ -125,13 +125,16 @@ class HarmonicLayout:
             x = x - self.basis.points[:, None] * self.turn
         return np.asarray(self.basis.analysis @ x)
 
-    def repeated(self, per_series: Array, by_order: bool = False) -> Array:
-        """(2H + 1, q) of one number per series; `by_order`: times max(1, k)^order, the size of the equations' rows."""
-        out = np.tile(np.asarray(per_series, float), (self.count, 1))
-        if by_order:
-            k = np.maximum(self.basis.k, 1.0)[:, None]
-            out *= np.where(self.second, k * k, k)
-        return out
+    @cached_property
+    def order(self) -> Array:
+        """(q,) orders of the equations, 2 or 1."""
+        return np.where(self.second, 2, 1)
+
+    @cached_property
+    def growth(self) -> Array:
+        """(2H + 1, q): max(1, k)^order, by which the rows of the equations grow with the harmonic."""
+        k = np.maximum(self.basis.k, 1.0)[:, None]
+        return np.asarray(k**self.order)
 
 
 def slope_of(G: Array) -> Array:

@@ -168,19 +168,21 @@ def adapted(
     L = problem.linearise(u, params)
     found = L.correction
     fields: dict[str, Any] = {}
-    scales = state_scales(L.X, natural_sizes(problem.system, L.period))
     period_scale = L.period if problem.own else 1.0
-    ratios = np.append(scales / problem.scales, period_scale / problem.period_scale)
-    if ((ratios > 2) | (ratios < 0.5)).any():
+    scales = state_scales(L.X, natural_sizes(problem.system, L.period))
+    ratios = [*(scales / problem.scales).tolist(), period_scale / problem.period_scale]
+    worst = found.error
+    if max(ratios) > 2 or min(ratios) < 0.5:
         fields |= {"scales": scales, "period_scale": period_scale}
-    worst = found.error * float((problem.scales / scales).max()) if fields else found.error
-    harmonics = _wanted_harmonics(problem, replace(found, error=worst)) if problem.adaptive else problem.harmonics
+        worst *= 1.0 / min(ratios[:-1])
+    found = found if worst == found.error else replace(found, error=worst)
+    harmonics = _wanted_harmonics(problem, found) if problem.adaptive else problem.harmonics
     if harmonics != problem.harmonics:
         fields["harmonics"] = harmonics
     elif not problem.fixed_samples and found.aliasing > max(_ALIAS * found.error, _ROUNDING):
         fields |= {"samples": 2 * problem.samples} if problem.samples < _MOST_SAMPLES * harmonics else {}
     if not problem.adaptive or harmonics <= problem.harmonics:
-        warn_of_truncation(problem, replace(found, error=worst), params)
+        warn_of_truncation(problem, found, params)
     if not fields:
         return None
     new = problem.changed(**fields)
