@@ -25,6 +25,7 @@ __all__ = ["discretised", "doubled_problem", "from_function", "started"]
 
 Array = np.ndarray
 _TOLERANCE = 1e-10
+_EXACT = 1e-12  # a residual, over the scales, that is rounding
 _TRANSIENTS = 400  # periods of a forced system
 
 
@@ -111,7 +112,8 @@ def _newton(problem: OrbitDiscretisation, u: Array, params: Array) -> Corrected:
 
 def _settled(problem: OrbitDiscretisation, u: Array, params: Array, what: str) -> Array:
     found = _newton(problem, u, params)
-    if not found.converged:
+    exact = found.note == "singular" and found.residual <= _EXACT  # at a branch point or fold: a solution all the same
+    if not (found.converged or exact):
         raise _failed(problem, params, found, what)
     if problem.own:
         states = problem.pieces(found.u, params)[2].reshape(-1, problem.system.n)
