@@ -64,9 +64,9 @@ def _twins(fold: Point, crossing: Point) -> bool:
     gap, apart = abs(fold.parameter - crossing.parameter) * fold.tangent.weight, abs(fold.s - crossing.s)
     if not (gap < _TWINS[0] and apart < _TWINS[1]):
         return False
-    if gap < 1e-8 and apart < 2e-4:
-        return True
-    return gap < 3 * max(r.problem.error(r.u, r.params) for r in (fold, crossing))
+    errors = [r.problem.error(r.u, r.params) for r in (fold, crossing)]
+    error = max((e for e in errors if math.isfinite(e)), default=0.0)
+    return gap < 3 * error or (gap < 1e-8 and apart < 2e-4 + 100 * math.sqrt(error))
 
 
 def _same(p: Point, q: Point) -> bool:
