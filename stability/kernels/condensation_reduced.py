@@ -273,16 +273,13 @@ def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent
     return sign * one
 
 
-@kernel
-def monodromy_product(M):  # type: ignore[no-untyped-def]
-    """M_{N-1} .. M_0."""
+@kernel(inline=True)
+def _multiply_all(M, product, work):  # type: ignore[no-untyped-def]
+    """product (n, n) = M_{N-1} .. M_0; `work` (n, n) is room for it."""
     intervals, n, _ = M.shape
-    product = np.empty((n, n))
     for a in range(n):
         for b in range(n):
-            product[a, b] = 0.0
-        product[a, a] = 1.0
-    work = np.empty((n, n))
+            product[a, b] = 1.0 if a == b else 0.0
     for j in range(intervals):
         for a in range(n):
             for b in range(n):
@@ -293,6 +290,14 @@ def monodromy_product(M):  # type: ignore[no-untyped-def]
         for a in range(n):
             for b in range(n):
                 product[a, b] = work[a, b]
+
+
+@kernel
+def monodromy_product(M):  # type: ignore[no-untyped-def]
+    """M_{N-1} .. M_0."""
+    n = M.shape[1]
+    product = np.empty((n, n))
+    _multiply_all(M, product, np.empty((n, n)))
     return product
 
 
@@ -314,5 +319,5 @@ def summary(M, J, h, b, leading, scales, nodes, Y, product):  # type: ignore[no-
             for i in range(degree):
                 value += leading[i + 1] * Y[j, i * n + a]
             rough = max(rough, abs(value) / (h[j] ** degree * scales[a]))
-    product[:] = monodromy_product(M)
+    _multiply_all(M, product, np.empty((n, n)))
     return trace, rough
