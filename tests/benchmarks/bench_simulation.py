@@ -124,10 +124,23 @@ def sweeps() -> None:
             print(f"carried sweep, 71 frequencies x 50 periods, {name}: {seconds:.2f} s")
 
 
+def basins() -> None:
+    """Figure 11's oscillator between its folds: a million cells, CPU time of all threads."""
+    system = st.models.duffing.from_physical(frequency=25.0)
+    grid = dict(x=("y", -6e-3, 6e-3), y=("y_dot", -0.8, 0.8))
+    st.basins(system, **grid, shape=(150, 150))
+    for side in (300, 1000):
+        began = time.process_time()
+        found = st.basins(system, **grid, shape=(side, side))
+        seconds = time.process_time() - began
+        print(f"basins of {side} x {side} cells: {seconds:.1f} s of CPU time, agreement {found.agreement:.3f}")
+
+
 def main() -> int:
     """All lines."""
     one_period()
     sweeps()
+    basins()
     return 0
 
 
