@@ -93,7 +93,7 @@ MARKERS: Mapping[Kind, str] = MappingProxyType({
     Kind.GENERALIZED_PERIOD_DOUBLING: "P",
     Kind.CHENCINER: "8",
     Kind.EXTREMUM: "_",
-    Kind.ISOLA_CENTRE: "o",
+    Kind.ISOLA_CENTRE: r"$\odot$",
     Kind.ISOLA_MERGER: "X",
 })  # fmt: skip
 _UNFILLED = frozenset("|_x1234")
