@@ -94,7 +94,7 @@ def adapted(
     count, edges = mesh.intervals, mesh.edges
     if problem.adaptive or moved:
         _, error = carried_errors(problem, u)
-        if not error <= _FINE * problem.accuracy:
+        if not error <= problem.accuracy:
             error = problem.error(u, params)
         count = _wanted_intervals(problem, error) if problem.adaptive else count
         if count > mesh.intervals and error < _LOST * _rounding(problem, u, params):
