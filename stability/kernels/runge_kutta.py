@@ -170,6 +170,25 @@ def _euler_step(x, K, rtol, atol, span):  # type: ignore[no-untyped-def]
     return _between(h, 0.0, 0.1 * span)
 
 
+@kernel(inline=True)
+def _end_of_step(h, line, K, zero, work, new, five, three, V, rtol, atol, P, which):  # type: ignore[no-untyped-def]
+    """Fill work and new with the end of the step (V are the variations in work); returns its scaled error."""
+    n, size = V.shape[0], V.shape[0] * (1 + V.shape[1])
+    _combine(_BEHIND[0], h, zero, K, work)
+    _combine(_BEHIND[1], h, zero, K, five)
+    _combine(_BEHIND[2], h, work, K, three)
+    for e in range(new.shape[0]):
+        work[e] += line[e]
+        new[e] = work[e]
+    error = _state_error(five, three, line, new, rtol, atol)
+    if V.shape[1] > 0:
+        other = _variation_error(
+            five[n:size].reshape(V.shape), three[n:size].reshape(V.shape), V, new, rtol, atol, P, which
+        )
+        error = other if not other <= error else error
+    return error
+
+
 @kernel
 def advance(  # type: ignore[no-untyped-def]
     field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps, dense, steps, times,
@@ -181,12 +200,12 @@ def advance(  # type: ignore[no-untyped-def]
     coefficients, as `integrate` describes, and ends with NO_ROOM when these are full.
     """
     n, count = z.shape[0], which.shape[0]
-    size, shape = n * (1 + count), (n, count)
+    size = n * (1 + count)
     flat = (size + 7) // 8 * 8  # filled up with zeros: the processor takes eight at a time
     K, lines, phase = np.zeros((16, flat)), np.zeros((6, flat)), np.empty(1)
     line, work, new, zero, five, three = lines[0], lines[1], lines[2], lines[3], lines[4], lines[5]
     F, J, Fp = np.empty(n), np.empty((n, n)), np.empty((n, P.shape[0]))
-    V = work[n:size].reshape(shape)
+    V = work[n:size].reshape((n, count))
     _exchange(z, line, _FIRST[1])
     for e in range(flat):
         work[e] = line[e]
@@ -211,18 +230,7 @@ def advance(  # type: ignore[no-untyped-def]
             if i != 12:
                 _combine(i, h, line, K, work)
             else:
-                _combine(_BEHIND[0], h, zero, K, work)
-                _combine(_BEHIND[1], h, zero, K, five)
-                _combine(_BEHIND[2], h, work, K, three)
-                for e in range(flat):
-                    work[e] += line[e]
-                    new[e] = work[e]
-                error = _state_error(five, three, line, new, rtol, atol)
-                if count > 0:
-                    other = _variation_error(
-                        five[n:size].reshape(shape), three[n:size].reshape(shape), V, new, rtol, atol, P, which
-                    )
-                    error = other if not other <= error else error
+                error = _end_of_step(h, line, K, zero, work, new, five, three, V, rtol, atol, P, which)
                 if not error < 1.0:
                     break
             phase[0] = phase0 + rate * _between(s + _NODES[i] * h, low, high)
