@@ -5,7 +5,9 @@ system (`defining`) at one parameter; with a second one free these zeros are cur
 continued lambda_1; the inner product is that of the inner problem plus (lambda_2 / scale_2)^2, e does not count.
 
 Of the spectrum the critical values are taken out: the verdict says whether the others are inside. STABLE: the curve
-bounds a stable region. A branch point persists where a symmetry or a trivial solution makes it: its unfolding parameter
+bounds a stable region. Beyond a resonance 1:1 or 1:2 (a Bogdanov-Takens point) the defining system of a pair goes on
+with real values r, 1/r (r, -r), a neutral saddle: nothing bifurcates there, and the verdict is UNSTABLE, for one of
+them is outside. A branch point persists where a symmetry or a trivial solution makes it: its unfolding parameter
 mu stays zero; anywhere else a second parameter breaks it into folds, and the curve does not start.
 References: Kuznetsov (2004), 10.3; Govaerts (2000), chapter 4.
 """
@@ -237,11 +239,20 @@ class Locus:
         growth = np.abs(others) - 1 if circle else others.real
         if not np.isfinite(inner.error) or not np.isfinite(growth).all():
             verdict = Verdict.UNDETERMINED
-        elif (growth > inner.error).any():
+        elif self.pair_growth(self.parts(u)[2]) > inner.error or (growth > inner.error).any():
             verdict = Verdict.UNSTABLE
         else:
             verdict = Verdict.STABLE if (growth < -inner.error).all() else Verdict.UNDETERMINED
         return Spectrum(np.zeros(0, complex), inner.error, 0, 0, 0, 0, verdict)
+
+    def pair_growth(self, extra: Array) -> float:
+        """How far outside the larger one of a real critical pair is; 0 of a complex one: no neutral saddle."""
+        if self.kind not in _PAIRS:
+            return 0.0
+        e = float(extra[0])
+        if self.inner.critical.circle:
+            return abs(e) - 1 + math.sqrt(e * e - 1) if abs(e) > 1 else 0.0
+        return math.sqrt(-e) if e < 0 else 0.0
 
     @property
     def monitors(self) -> tuple[tuple[Kind, Any], ...]:

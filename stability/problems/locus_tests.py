@@ -151,7 +151,7 @@ def confirmed(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None
 
 def _extreme(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | None:
     """What it is where a parameter's rate vanishes."""
-    if scale < 10 * _NOISE:
+    if scale < 10 * _NOISE or (kind is Kind.EXTREMUM and curve.pair_growth(curve.parts(point.u)[2]) > 0):
         return None
     first, second = abs(_first(point)), abs(_second(point))
     jumps = (first if kind is Kind.FOLD else second) > 0.1 * scale  # a singular point: the family begins there
