@@ -47,6 +47,27 @@ def test_contracted_multipliers_are_not_mistaken_for_others():
     assert liouville_gap(np.array([np.inf, 0.1], complex), 0.0) == 0.0
 
 
+def test_a_product_too_large_is_explained_by_faint_multipliers_only():
+    """e^-6000 found as 0.018 says nothing about 0.79; too small a product, or one with no faint factor, does."""
+    pair = np.array([0.79 + 0.07j, 0.79 - 0.07j, 0.018])
+    assert liouville_gap(pair, -6000.0) == 0.0
+    assert liouville_gap(np.array([0.9, 0.02 + 0.01j, 0.02 - 0.01j]), -6000.0) == 0.0
+    assert liouville_gap(pair, np.log(0.003)) > 0.7  # the smallest would be 0.005: known well, and it is not that
+    assert liouville_gap(pair, np.log(0.02)) > 0.7  # too small
+    assert liouville_gap(np.array([0.9 + 0.1j, 0.9 - 0.1j]), -20.0) > 0.8  # no others: both are wrong
+    assert liouville_gap(np.array([5.0 + 0j, 3.0 + 0j]), -20.0) > 0.9  # outside: the verdict is theirs
+
+
+def test_a_stiff_state_costs_no_verdict_of_the_others():
+    """Circuit with L/R = 17 us beside a period of 0.1 s: multiplier e^-6000. Shooting (implicit, adaptive) agrees."""
+    system = st.models.harvester.from_physical(cubic=1.9e7)
+    orbits = [st.solve(problem(system), frequency=10.0) for problem in (st.Collocation, st.Shooting)]
+    assert [orbit.verdict for orbit in orbits] == [st.Verdict.STABLE] * 2
+    np.testing.assert_allclose(orbits[0].multipliers[:2], orbits[1].multipliers[:2], atol=1e-8)
+    branch = st.continuation(st.Collocation(system), "frequency", (20.0, 32.0))
+    assert branch.count(st.Verdict.UNDETERMINED) <= len(branch.special) and branch.count(st.Verdict.UNSTABLE) > 0
+
+
 def test_errors_on_a_branch_contain_the_gap():
     """The error of every point of the textbook oscillator's branch is at least what Liouville's formula measures."""
     branch = st.continuation(st.Collocation(st.models.duffing_textbook(delta=0.1, gamma=25.0)), "omega", (3.0, 1.5))
