@@ -25,7 +25,7 @@ from .images import with_images
 from .locating import Found
 from .open_resonance import warn_if_open
 from .points import Point
-from .settings import Settings, checked
+from .settings import Settings, checked, checked_problem
 from .starting import born_sides, first_point, inside_window
 from .walking import Walk, ended
 
@@ -177,6 +177,7 @@ def steps(
         if start is not None:
             raise InputError("a branch goes on from its own ends: leave start= away")
         return _walk_on(problem, window, tolerance=tolerance, progress=None, **asked)
+    checked_problem(problem)
     if name is None or window is None:
         raise InputError("which parameter, and from where to where? steps(problem, name, (from, to))")
     accuracy = 1e-9 if tolerance is None else tolerance
@@ -291,8 +292,8 @@ def solve(problem: Problem, *, start: Any = None, tolerance: float = 1e-9, **par
 
     Raises
     ------
-    UnknownNameError
-        A parameter the problem does not have.
+    UnknownNameError, InputError
+        A parameter the problem does not have; a system where a problem is needed.
     ConvergenceError
         Nothing converged; carries the last iterate.
 
@@ -305,6 +306,7 @@ def solve(problem: Problem, *, start: Any = None, tolerance: float = 1e-9, **par
     """
     from ..errors import check_names
 
+    checked_problem(problem)
     names = list(problem.parameters)
     check_names("parameter", params, names, "this problem")
     vector = np.array([float(params.get(k, v)) for k, v in problem.parameters.items()])

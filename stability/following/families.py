@@ -32,6 +32,7 @@ from ..errors import ConvergenceError, InputError, OpenResonanceWarning, check_n
 from ..protocols import Problem
 from ..results.branch import Branch
 from .driver import continuation
+from .settings import checked_problem
 
 __all__ = ["families"]
 
@@ -101,6 +102,7 @@ def families(
     >>> len(st.families(st.Equilibrium(system), "r", (-2, 2)))
     2
     """
+    checked_problem(problem)
     if problem.seed() is not None:
         raise InputError("a problem born at a special point is one branch: give it to continuation")
     if not isinstance(places, int) or places < 0:

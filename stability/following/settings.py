@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 
 from ..errors import InputError, unknown_name
 from ..protocols import Problem
+from ..systems.system import System
 from ..words import Kind
 from .stepping import Steps
 
-__all__ = ["Progress", "Settings", "checked"]
+__all__ = ["Progress", "Settings", "checked", "checked_problem"]
 
 
 class Progress(NamedTuple):
@@ -68,6 +69,8 @@ def _number(what: str, value: Any, low: float, high: float = math.inf) -> float:
 def _event_list(events: Any) -> tuple[tuple[str, Callable[[Any], float]], ...]:
     if callable(events):
         events = (events,)
+    if isinstance(events, str) or not isinstance(events, Iterable):
+        raise InputError(f"events must be a function, solution -> float, several, or a mapping of them, got {events!r}")
     pairs = list(events.items()) if isinstance(events, Mapping) else [("", e) for e in events]
     for name, function in pairs:
         if not callable(function):
@@ -76,6 +79,8 @@ def _event_list(events: Any) -> tuple[tuple[str, Callable[[Any], float]], ...]:
 
 
 def _stop_list(stop_at: Any, names: Iterable[str]) -> tuple[str, ...]:
+    if not isinstance(stop_at, Iterable):
+        raise InputError(f'stop_at must be kinds, labels or names of events, such as ("PD",), got {stop_at!r}')
     wanted = (stop_at,) if isinstance(stop_at, str) else tuple(stop_at)
     prefixes = {kind.label for kind in Kind}
     for item in wanted:
@@ -83,6 +88,20 @@ def _stop_list(stop_at: Any, names: Iterable[str]) -> tuple[str, ...]:
         if not known:
             raise unknown_name("kind or event to stop at", item, [*sorted(prefixes), *names], "continuation")
     return tuple(item.label if isinstance(item, Kind) else str(item) for item in wanted)
+
+
+def checked_problem(problem: Any) -> None:
+    """InputError for anything that is no problem, above all a system, saying what to make of it."""
+    if isinstance(problem, System):
+        raise InputError(
+            f"'{problem.name}' is a system, and its motions are of several sorts: give the problem to be solved, "
+            "st.Collocation(system) for its periodic orbits or st.Equilibrium(system) for its equilibria"
+        )
+    if not (hasattr(problem, "seed") and hasattr(problem, "correct")):
+        raise InputError(
+            "a problem is needed, such as st.Collocation(system) or st.Equilibrium(system), "
+            f"got {type(problem).__name__}"
+        )
 
 
 def checked(
@@ -106,6 +125,7 @@ def checked(
     UnknownNameError, InputError
         The parameter does not exist; a window, step, value or tolerance is outside what is allowed.
     """
+    checked_problem(problem)
     names = list(problem.parameters)
     if name not in names:
         raise unknown_name("parameter", name, names, "this problem")
@@ -128,7 +148,10 @@ def checked(
         raise InputError(f"ds = {step:g} is longer than ds_max = {longest:g}")
     if not isinstance(max_points, int) or max_points < 2:
         raise InputError(f"max_points must be a whole number >= 2, got {max_points!r}")
-    wanted = tuple(float(v) for v in ((at,) if isinstance(at, (int, float)) else at))
+    try:
+        wanted = tuple(float(v) for v in (at if isinstance(at, Iterable) else (at,)))
+    except (TypeError, ValueError):
+        raise InputError(f"at must be values of '{name}', got {at!r}") from None
     outside = [v for v in wanted if not min(first, last) <= v <= max(first, last)]
     if outside:
         raise InputError(f"at = {outside[0]:g} lies outside the window ({first:g}, {last:g}) of '{name}'")

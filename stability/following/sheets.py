@@ -23,6 +23,7 @@ from ..results.branch import Branch
 from ..results.special import SpecialPoint
 from ..words import Kind
 from .driver import continuation
+from .settings import checked_problem
 
 __all__ = ["loci"]
 
@@ -85,11 +86,13 @@ def loci(
     >>> x, r, s = sp.symbols("x r s", real=True)  # folds of two kinds of parabolas: r = s^2, r = s + 2
     >>> f = (r - s**2 - x**2) * (r - s - 2 - (x - 5)**2)
     >>> system = st.System(name="two", coordinates=("x",), states=("x",), parameters={"r": 0.0, "s": 0.0}, rhs=(f,))
-    >>> curves = st.loci(st.Equilibrium(system), "r", (4, -1), free="s", free_window=(-1, 1), cuts=(0.5,), start=dict(x=2))
+    >>> options = dict(free="s", free_window=(-1, 1), cuts=(0.5,), start=dict(x=2))
+    >>> curves = st.loci(st.Equilibrium(system), "r", (4, -1), **options)
     >>> [str(c.meshes[0].kind) for c in curves]
     ['fold']
     """
-    wanted = CURVES if kinds is None else tuple(Kind(kind) for kind in kinds)
+    checked_problem(problem)
+    wanted = CURVES if kinds is None else tuple(_kind(kind) for kind in ((kinds,) if isinstance(kinds, str) else kinds))
     for kind in wanted:
         if kind not in CURVES:
             raise InputError(f"there are no curves of '{kind}' points; curves exist for {', '.join(map(str, CURVES))}")
@@ -121,6 +124,13 @@ def loci(
     if trouble is not None and not done:
         raise trouble
     return tuple(sorted(curves, key=lambda curve: CURVES.index(curve.meshes[0].kind)))
+
+
+def _kind(given: Kind | str) -> Kind:
+    try:
+        return Kind(given)
+    except ValueError:
+        raise unknown_name("kind of curve", given, map(str, CURVES), "loci") from None
 
 
 def _values(free: str, window: tuple[float, float], cuts: int | Sequence[float]) -> list[float]:

@@ -37,7 +37,7 @@ from .orbit_mesh import OrbitMesh
 from .orbit_spectrum import contracted, deflated, eigenvalues, liouville_gap, orbit_spectrum
 from .orbit_starts import doubled_problem
 from .orbit_symmetry import Mirror, broken, chosen, symmetric_doubled
-from .orbits import OrbitDiscretisation, whole_number, winding_vector
+from .orbits import OrbitDiscretisation, one_period, whole_number, winding_vector
 
 __all__ = ["Collocation"]
 
@@ -127,6 +127,7 @@ class Collocation(OrbitDiscretisation):
             object.__setattr__(self, "intervals", 10 if symmetric else 20)
         for name, low, high in (("degree", 1, 11), ("intervals", 1, _MAX_INTERVALS), ("multiple", 1, 64)):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), low, high))
+        one_period("multiple", self.multiple, self.system, not self.own)
         if not self.accuracy > 0:
             raise InputError(f"accuracy = {self.accuracy!r}: a positive number is needed (1e-9 is the default)")
         object.__setattr__(self, "span", self.multiple * (0.5 if symmetric else 1.0))

@@ -35,7 +35,7 @@ from ..systems.stops import refuse_stops
 from .harmonic_layout import HarmonicLayout
 from .harmonic_linearisation import HarmonicLinearisation, HarmonicWork
 from .harmonic_samples import first_samples, polynomial_degree
-from .orbits import OrbitDiscretisation, whole_number, winding_vector
+from .orbits import OrbitDiscretisation, one_period, whole_number, winding_vector
 
 __all__ = ["HarmonicBalance"]
 
@@ -115,11 +115,7 @@ class HarmonicBalance(OrbitDiscretisation):
         object.__setattr__(self, "adaptive", self.harmonics is None if self.adaptive is None else bool(self.adaptive))
         harmonics = _FIRST * self.subharmonic if self.harmonics is None else self.harmonics
         object.__setattr__(self, "harmonics", whole_number("harmonics", harmonics, 1, _MAX_HARMONICS))
-        if self.own and self.subharmonic != 1:
-            raise InputError(
-                f"subharmonic = {self.subharmonic}: '{self.system.name}' is autonomous and has no forcing period to be "
-                "a multiple of; leave subharmonic=1 (a doubled orbit comes from switch at a period doubling)"
-            )
+        one_period("subharmonic", self.subharmonic, self.system, not self.own)
         fewest = self.harmonics if self.fewest is None else whole_number("fewest", self.fewest, 1, self.harmonics)
         object.__setattr__(self, "fewest", fewest)
         most = max(_MOST, self.harmonics) if self.most is None else self.most

@@ -23,7 +23,7 @@ from .orbit_measures import orbit_measures, orbit_view
 from .orbit_starts import discretised, started
 from .orbit_symmetry import mirrored, mirrored_problem
 
-__all__ = ["OrbitDiscretisation", "whole_number", "winding_vector"]
+__all__ = ["OrbitDiscretisation", "one_period", "whole_number", "winding_vector"]
 
 Array = np.ndarray
 _CRITICAL = Critical(circle=True, pair=Kind.NEIMARK_SACKER, minus=-1.0)
@@ -36,6 +36,15 @@ def whole_number(name: str, value: Any, low: int, high: int) -> int:
     if not low <= value <= high:
         raise InputError(f"{name} = {value!r}: a whole number from {low} to {high} is needed")
     return int(value)
+
+
+def one_period(name: str, number: int, system: Any, forced: bool) -> None:
+    """InputError for orbits of several forcing periods of a system that has no forcing."""
+    if number != 1 and not forced:
+        raise InputError(
+            f"{name} = {number}: '{system.name}' is autonomous and has no forcing period to be a multiple of; leave "
+            f"{name}=1 (a doubled orbit comes from switch at a period doubling)"
+        )
 
 
 def winding_vector(system: Any, given: Any) -> Array:

@@ -31,7 +31,7 @@ from ..protocols import Corrected, Spectrum, Tangent
 from .impact_layout import frozen, started_at_walls
 from .orbit_adaption import natural_sizes, state_scales
 from .orbit_spectrum import contracted, deflated, eigenvalues, orbit_spectrum, spectrum_distance
-from .orbits import OrbitDiscretisation, whole_number, winding_vector
+from .orbits import OrbitDiscretisation, one_period, whole_number, winding_vector
 from .shooting_linearisation import Segments, ShootingLinearisation
 
 __all__ = ["Shooting"]
@@ -84,6 +84,7 @@ class Shooting(OrbitDiscretisation):
     def __post_init__(self) -> None:
         for name, high in (("segments", 1000), ("multiple", 64)):
             object.__setattr__(self, name, whole_number(name, getattr(self, name), 1, high))
+        one_period("multiple", self.multiple, self.system, not self.own)
         for name in ("rtol", "atol"):
             if not 1e-14 <= getattr(self, name) <= 1e-3:
                 raise InputError(f"{name} = {getattr(self, name)!r}: a number from 1e-14 to 1e-3 is needed")
