@@ -138,7 +138,8 @@ def _note(follower: Follower | None) -> str:
     """Why a side ended, in words."""
     if follower is None:
         return ""
-    return "not followed to its end yet" if follower.status is None else follower.note
+    end = "not followed to its end yet" if follower.status is None else follower.note
+    return "; ".join(part for part in (end, follower.wanted.note) if part)
 
 
 def assemble(

@@ -70,7 +70,8 @@ def continuation(
     at : float or tuple of float
         Values of lambda at which a point is computed exactly (``Kind.USER``).
     events : callable, tuple of callables or mapping of names to callables
-        Functions solution -> float; their zeros are located (``Kind.USER``, named).
+        Functions solution -> float; their zeros are located (``Kind.USER``, named). Where one is NaN a zero may be
+        missed: a `StabilityWarning`, and ``Branch.message``, say so.
     stop_at : tuple
         Kinds, labels ("PD", "PD2") or event names at which to stop; the branch then ends at that point.
     tolerance : float

@@ -14,15 +14,15 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, StabilityWarning
+from ..errors import StabilityWarning
 from ..protocols import Corrected, Problem, Tangent
 from ..words import Kind, Status
 from .edges import Edge
@@ -35,6 +35,7 @@ from .searching import between, hopped
 from .settings import Progress, Settings
 from .stepping import KINK, Comparison, compare, next_length, predict
 from .walls import landing, on_wall
+from .wanted import Wanted
 
 __all__ = ["Entry", "Follower"]
 
@@ -45,29 +46,6 @@ _STALL_POINTS, _STALL, _STALL_LENGTH = 8, 1e-8, 0.05
 _PATIENCE = 6
 _BEYOND_GRAZING = "the orbit grazes a stop, what lies beyond has other impacts: go on by switch"
 _ONE = 1e-7  # two events nearer to each other than this are one
-
-
-def _gap(value: float, point: Point) -> float:
-    return point.parameter - value
-
-
-def _value_of(name: str, function: Callable[[Any], float], point: Point) -> float:
-    """A user's event function at a point; what it raises is told whose it is."""
-    solution = point.problem.view(point.u, point.params)
-    try:
-        return float(function(solution))
-    except Exception as error:
-        error.add_note(f"the event '{name}'")
-        raise
-
-
-def _first_value(name: str, function: Callable[[Any], float], point: Point) -> float:
-    """The same at the first point: a function that fails there is a mistake, and no work is lost yet."""
-    try:
-        return _value_of(name, function, point)
-    except Exception as error:
-        reason = f"{type(error).__name__}: {error}"
-        raise InputError(f"the event '{name}' failed at the first solution: {reason}") from error
 
 
 class Entry(NamedTuple):
@@ -102,7 +80,7 @@ class Follower(Iterator[Point]):
         self._rate = max(rate, float(np.abs(first.spectrum.values).max(initial=0.0)))
         self._norm = self._norm_of(first)
         self._extent: list[tuple[float, float]] = []
-        self._event_values = [_first_value(name, f, first) for name, f in settings.events]
+        self.wanted = Wanted(settings, self.locator, first)
         self._monitor, self._edge = Monitor(first), Edge()
         self._seen: dict[str, int] = {}
 
@@ -396,39 +374,9 @@ class Follower(Iterator[Point]):
         own = [f for f in found if f.point.s >= a.s]
         knots = [a, *(f.point for f in sorted(own, key=lambda f: f.point.s)), b]
         found = found + self._monitor.zeros(self.locator, knots)
-        if self.settings.at:
-            found = found + self._values(knots)
-        if self.settings.events:
-            found = found + self._user_events(knots)
+        if self.settings.at or self.settings.events:
+            found = found + self.wanted.between(knots)
         return sorted(found, key=lambda f: f.point.s)
-
-    def _values(self, knots: list[Point]) -> list[Found]:
-        found = []
-        for p, q in pairwise(knots):
-            for value in self.settings.at:
-                if (p.parameter - value) * (q.parameter - value) < 0:
-                    point = self.locator.at_parameter(p, q, value)
-                    if point is None:
-                        ends = p.parameter - value, q.parameter - value
-                        point = self.locator.zero(p, q, partial(_gap, value), *ends)
-                    if point is not None:
-                        found.append(Found(point, Kind.USER, (p.parameter, q.parameter), 0.0))
-        return found
-
-    def _user_events(self, knots: list[Point]) -> list[Found]:
-        found = []
-        for k, (name, function) in enumerate(self.settings.events):
-
-            value_of = partial(_value_of, name, function)
-
-            values = [self._event_values[k], *(value_of(p) for p in knots[1:])]
-            self._event_values[k] = values[-1]
-            for (p, gp), (q, gq) in zip(zip(knots, values), zip(knots[1:], values[1:])):
-                if gp * gq < 0:
-                    point = self.locator.zero(p, q, value_of, gp, gq)
-                    if point is not None:
-                        found.append(Found(point, Kind.USER, (p.parameter, q.parameter), 0.0, name))
-        return found
 
     def _known(self, found: Found) -> bool:
         """Whether this event is among the entries already (a segment that is searched again)."""

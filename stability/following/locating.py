@@ -125,7 +125,10 @@ class Locator:
         return make_point(a.problem, found, tangent, self.k, a.s + min(1, max(0, where)) * (b.s - a.s), b.step)
 
     def zero(self, a: Point, b: Point, g: Callable[[Point], float], ga: float, gb: float) -> Point | None:
-        """Where a function of the solution vanishes between a and b: Illinois iteration along the curve."""
+        """Where a function of the solution vanishes between a and b: Illinois iteration along the curve.
+
+        None where the curve or the function is lost on the way.
+        """
         x0, x1, side, best = 0.0, 1.0, 0, None
         for _ in range(80):
             x = (x0 * gb - x1 * ga) / (gb - ga)
@@ -133,6 +136,8 @@ class Locator:
             if best is None:
                 return None
             gx = g(best)
+            if math.isnan(gx):
+                return None
             if gx == 0 or x1 - x0 < 1e-14:
                 break
             if gx * ga > 0:

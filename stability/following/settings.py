@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from ..errors import InputError, unknown_name
@@ -27,7 +27,10 @@ class Progress(NamedTuple):
 
 @dataclass(frozen=True)
 class Settings:
-    """A continuation request: parameter, window (from, to), steps, wanted values, user functions, stops."""
+    """A continuation request: parameter, window (from, to), steps, wanted values, user functions, stops.
+
+    told : names of the functions about which a warning was given
+    """
 
     name: str
     index: int
@@ -39,6 +42,7 @@ class Settings:
     stop_at: tuple[str, ...]
     tolerance: float
     progress: Callable[[Progress], Any] | None
+    told: set[str] = field(default_factory=set, compare=False)
 
     @property
     def low(self) -> float:

@@ -5,6 +5,10 @@ Witness: `continuation` itself, run in one go.
 
 from __future__ import annotations
 
+import math
+import re
+import warnings
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -137,6 +141,31 @@ def test_an_event_that_fails_on_the_way_ends_the_branch_and_keeps_it(both: bool)
     assert branch.status is st.Status.STOPPED and branch.labels == ("LP1",) and branch.columns["x"].min() < -0.5
     assert branch.message == "the event 'edge': ZeroDivisionError: float division by zero"
     assert (branch.residuals < 1e-9).all()
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_an_event_that_is_not_a_number_is_told_once(both: bool) -> None:
+    """Beyond x = -0.5 the function has no value, and the branch says why; x = 0.3 is found."""
+    options = {"start": st.solve(one_state(a - x**2), start=[1.0], a=1.0)} if both else {"start": [1.4]}
+
+    def lost(solution: st.FixedPoint) -> float:
+        return solution["x"] - 0.3 if solution["x"] > -0.5 else math.nan
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        branch = st.continuation(one_state(a - x**2), "a", (2.0, -1.0), events={"edge": lost}, **options)
+    assert [str(w.message) for w in caught if w.category is StabilityWarning] == [branch.message]
+    assert re.fullmatch(r"the event 'edge' is not a number at a = 0\.\d+: a zero of it may be missed", branch.message)
+    assert branch.status is st.Status.PARAMETER_BOUND and branch.labels == ("UZ1", "LP1")
+    assert abs(branch["edge"].params["a"] - 0.09) < 1e-9
+
+
+def test_an_event_that_is_never_a_number() -> None:
+    with pytest.warns(StabilityWarning, match="'nothing' is not a number at a = 2: a zero of it may be missed"):
+        branch = st.continuation(
+            one_state(a - x**2), "a", (2.0, -1.0), start=[1.4], events={"nothing": lambda solution: math.nan}
+        )
+    assert branch.status is st.Status.PARAMETER_BOUND and "'nothing' is not a number" in branch.message
 
 
 def test_an_event_that_fails_at_once_is_a_mistake() -> None:
