@@ -245,8 +245,11 @@ class Branch:
             raise unknown_name("continued parameter", wrong, [self.name], "this branch")
         target = float(value[self.name])
         found: list[tuple[float, tuple[Any, Array, Array]]] = []
-        for i in np.nonzero(self.parameter == target)[0]:
-            found.append((float(i), (self._problem(int(i)), self.unknowns[i], self._vector(int(i)))))
+        exact = np.nonzero(self.parameter == target)[0].tolist()
+        if self.statuses == (Status.CLOSED_LOOP,) * 2 and {0, len(self) - 1} <= set(exact):
+            exact.remove(len(self) - 1)  # the last point of a closed curve is its first
+        for i in exact:
+            found.append((float(i), (self._problem(i), self.unknowns[i], self._vector(i))))
         gap = self.parameter - target
         for i in np.nonzero(gap[:-1] * gap[1:] < 0)[0]:
             found.append((i + 0.5, self._between(int(i), target)))

@@ -43,6 +43,17 @@ def test_closed_curve_is_followed_once() -> None:
     assert abs(abs(turned[-1] - turned[0]) - 2 * np.pi) < 1e-6
 
 
+@pytest.mark.parametrize("value", [0.3, 0.31])
+def test_a_closed_curve_has_its_seam_once(value: float) -> None:
+    """x = +-sqrt(1 - a^2/4), also at the value where the loop was begun and ends."""
+    problem = one_state(x**2 + a**2 / 4 - 1, a=0.0)
+    branch = st.continuation(problem, "a", (-3.0, 3.0), start=st.solve(problem, start=[-0.9], a=0.3))
+    assert branch.statuses == (st.Status.CLOSED_LOOP,) * 2
+    exact = np.sqrt(1 - value**2 / 4)
+    np.testing.assert_allclose(sorted(p["x"] for p in branch.at(a=value)), [-exact, exact], atol=1e-9)
+    assert len(branch.rows_at(a=value)) == 2
+
+
 def test_a_solution_inside_the_window_is_followed_both_ways() -> None:
     problem = one_state(a - x**3 - x, a=0.0)
     branch = st.continuation(problem, "a", (-2.0, 2.0), start=st.solve(problem, a=0.5))
