@@ -18,7 +18,7 @@ __all__ = ["plot_comparison"]
 
 
 def plot_comparison(comparison: Comparison, ax: Any = None) -> list[Any]:
-    """Draw every compared branch, sweep and measured response; unstable parts dashed; special points of the reference only.
+    """Draw every compared branch, sweep and measured response; unstable parts dashed; special points: the reference's.
 
     Parameters
     ----------

@@ -220,13 +220,13 @@ def _followed(homotopy: Callable[[Array, Array], tuple[Array, Array, Array]], y:
         _, A, rate = homotopy(y[k], t[k])
         new_t = np.minimum(t[k] + h[k], 1.0)
         z = y[k] - (new_t - t[k])[:, None] * _solved(A, rate)
-        first = None
-        for _ in range(4):
+        first = change = np.zeros(len(k))
+        for turn in range(4):
             value, A, _ = homotopy(z, new_t)
             step = _solved(A, value)
             z = z - step
             change = np.abs(step).max(axis=1) / (1 + np.abs(z).max(axis=1))
-            first = change if first is None else first
+            first = first if turn else change
         good = np.isfinite(z).all(axis=1) & (change < 1e-11) & (first < 0.02)
         y[k[good]], t[k[good]] = z[good], new_t[good]
         h[k] = np.where(good, np.where(first < 0.004, 2 * h[k], h[k]), 0.4 * h[k])

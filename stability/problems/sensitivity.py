@@ -99,7 +99,7 @@ def _derivatives(
             f"'{of}' does not move this point, or it is one of higher codimension: its place has no derivative",
             last=u,
         )
-    symmetry = getattr(problem, "symmetry", None)  # of orbits on half of their period: what breaks it has no place there
+    symmetry = getattr(problem, "symmetry", None)  # of half-period orbits: what breaks it has no place there
     breaking = {i for i, j in enumerate(rest) if symmetry is not None and names[j] in symmetry.fixed}
     if kind is Kind.BRANCH_POINT:
         drive = np.abs(right[:n]).max(axis=0)

@@ -86,9 +86,9 @@ def switch(point: SpecialPoint) -> Born:
     -------
     Born
         A branch point gives both halves of the crossing branch, joined (where they are images of each other under a
-        symmetry of the system, ``point.symmetry_breaking``, the second is written down from the first); a Hopf point the periodic orbits (by
-        `Collocation`); a period doubling the orbits of twice the period; a grazing point the orbits with one impact
-        more, or one less.
+        symmetry of the system, ``point.symmetry_breaking``, the second is written down from the first); a Hopf point
+        the periodic orbits (by `Collocation`); a period doubling the orbits of twice the period; a grazing point the
+        orbits with one impact more, or one less.
 
     Raises
     ------

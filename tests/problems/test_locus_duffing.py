@@ -1,5 +1,7 @@
 """Fold curves of Duffing's oscillator in one-harmonic balance against its discriminant; zeros that fall on a point."""
 
+import itertools
+
 import numpy as np
 import pytest
 import sympy as sp
@@ -7,7 +9,6 @@ import sympy as sp
 import stability as st
 from stability.following.monitoring import Monitor
 from stability.words import Kind
-
 
 pytestmark = pytest.mark.filterwarnings("ignore::stability.errors.TruncationWarning")
 
@@ -70,7 +71,7 @@ def test_a_zero_that_falls_on_a_point_counts_once():
         problem = Problem(function)
         knots = [Knot(problem, s) for s in places]
         monitor, found = Monitor(knots[0]), []
-        for a, b in zip(knots, knots[1:]):
+        for a, b in itertools.pairwise(knots):
             found += monitor.zeros(Bisection(), [a, b])
         return [f.point.s for f in found]
 
