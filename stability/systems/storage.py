@@ -70,7 +70,9 @@ def from_plain(data: Mapping[str, Any]) -> dict[str, Any]:
             "base": None if base is None else BaseMotion(str(base[0]), from_tree(base[1])),
             "description": str(data["description"]),
             "reconstruction": {str(k): from_tree(e) for k, e in data.get("reconstruction", ())},
-            "declared_symmetries": tuple(Symmetry(tuple((str(a), str(b)) for a, b in s), float(h)) for s, h in data.get("symmetries", ())),
+            "declared_symmetries": tuple(
+                Symmetry(tuple(dict(s).items()), float(h)) for s, h in data.get("symmetries", ())
+            ),
         }
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         if isinstance(error, FileFormatError):
