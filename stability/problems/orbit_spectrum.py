@@ -21,7 +21,8 @@ it to the k smallest multipliers alone (k = 1; 2: a conjugate pair, where there 
 s = |mu_n| (|E| / |prod mu|)^(1/k). Where |mu_n| < 1 and s <= r this is what is believed, and gap = 0: the error is
 below |mu_n| itself, leads inwards and says nothing about any other multiplier. Gauss's rule does that to the mode of a
 stiff state: degree 5 leaves about (1 - 60/|z|)^N, some hundredths, for z = h lambda = -300 on N = 20 intervals, where
-the multiplier is e^-6000. A product that is too small is never explained so, nor one whose smallest factor is not faint.
+the multiplier is e^-6000. A product that is too small is never explained so, nor
+one whose smallest factor is not faint.
 """
 
 from __future__ import annotations

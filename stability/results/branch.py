@@ -248,8 +248,8 @@ class Branch:
         exact = np.nonzero(self.parameter == target)[0].tolist()
         if self.statuses == (Status.CLOSED_LOOP,) * 2 and {0, len(self) - 1} <= set(exact):
             exact.remove(len(self) - 1)  # the last point of a closed curve is its first
-        for i in exact:
-            found.append((float(i), (self._problem(i), self.unknowns[i], self._vector(i))))
+        for k in exact:
+            found.append((float(k), (self._problem(k), self.unknowns[k], self._vector(k))))
         gap = self.parameter - target
         for i in np.nonzero(gap[:-1] * gap[1:] < 0)[0]:
             found.append((i + 0.5, self._between(int(i), target)))
