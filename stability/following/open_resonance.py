@@ -9,7 +9,8 @@ Along the backbone w^2 = k(a, w). A response rides on it where most of w^2 - k(0
 where the motion lags by 90 degrees: on the backbone with D = F. If D < F all along the backbone, the resonance is open:
 the branch never turns back. For u'' + 2 xi u' + u + beta u^3 = Omega^2 cos(Omega tau), D/F = 2 xi a/Omega rises to
 4 xi/sqrt(3 beta): open for beta >= 16 xi^2/3. For one degree of freedom, responses of the forcing's period, and slow
-flows of `averaging`. Reference: Krack and Gross (2019), chapter 2.
+flows of `averaging`. A backbone that does not bend, k(a) = k(0) within half of the detuning, is none: the response is
+linear there, whatever damps it. Reference: Krack and Gross (2019), chapter 2.
 """
 
 from __future__ import annotations
@@ -79,7 +80,7 @@ def _of_oscillator(problem: Any, params: Array, index: int) -> Balance:
     """The head of this module, by samples of f over the angle of the motion and the phase of the forcing."""
     system, evaluations = problem.system, problem.evaluations
     place = system.states.index(system.coordinates[0])
-    theta = 2 * np.pi * np.arange(_ANGLES) / _ANGLES
+    theta = 2 * np.pi * (np.arange(_ANGLES) + 0.5) / _ANGLES  # mirrored at 0 and pi, where dry friction jumps
     angle, phase = (g.ravel() for g in np.meshgrid(theta, np.arange(_PHASES) / _PHASES, indexing="ij"))
     rest, turns = np.zeros((_ANGLES, 2)), np.arange(_ANGLES) / _ANGLES
 

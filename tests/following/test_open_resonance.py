@@ -3,6 +3,7 @@
 import warnings
 
 import pytest
+import sympy as sp
 
 import stability as st
 from stability.errors import OpenResonanceWarning
@@ -45,7 +46,17 @@ def test_share_of_the_damping_force():
     assert f"({4 * XI / (12 * LIMIT) ** 0.5:.2f} of it" in str(found.message)
 
 
+def rubbing(force: float) -> st.System:
+    """u'' + u + 0.3 sign(u') = force cos(w t): a straight backbone; D = 1.2/pi stays below F = 2."""
+    t, w = sp.symbols("t w", real=True)
+    u = sp.Function("u")(t)
+    equation = force * sp.cos(w * t) - sp.Rational(3, 10) * sp.sign(u.diff(t)) - u
+    return st.System.from_equations({u.diff(t, 2): equation}, [u], parameters=dict(w=2.0), period=2 * sp.pi / w)
+
+
 QUIET = {
+    "dry friction above the resonance": (lambda: st.Collocation(rubbing(2.0), accuracy=1e-4), "w", (2.5, 1.5)),
+    "dry friction below the resonance": (lambda: st.Collocation(rubbing(2.0), accuracy=1e-3), "w", (0.8, 0.7)),
     "window ends before the peak": (lambda: st.Collocation(st.models.duffing(xi=XI, beta=0.001)), "Omega", (0.3, 1.2)),
     "window ends before the resonance": (lambda: st.Collocation(st.models.duffing(xi=XI, beta=0.05)), "Omega", (0.3, 0.8)),
     "linear": (lambda: st.Collocation(st.models.duffing(xi=XI, beta=0.0)), "Omega", (0.3, 3.0)),
