@@ -16,6 +16,7 @@ import json
 import os
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from pathlib import Path
@@ -30,6 +31,7 @@ __all__ = ["class_of", "load", "read", "register", "schema_of", "write", "write_
 
 _VERSION = 1
 _HEADER = "__header__"
+_NOT_OURS = "not a stored result of this library"
 _CLASSES: dict[str, type] = {}
 # schema -> module below `stability` that registers it, imported on demand
 _HOMES = {
@@ -94,6 +96,8 @@ def write(
     ------
     InputError
         An array of objects, or a header value that is not plain data.
+    FileNotFoundError
+        The folder does not exist.
 
     Examples
     --------
@@ -113,6 +117,8 @@ def write(
     text = json.dumps(outer, default=_plain, ensure_ascii=False)
     content = {name: np.asarray(a) for name, a in arrays.items()}
     content[_HEADER] = np.frombuffer(text.encode(), dtype=np.uint8)
+    if not target.parent.is_dir():
+        raise FileNotFoundError(f"'{os.fspath(path)}' cannot be written: there is no folder '{target.parent}'")
     handle, temporary = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".tmp", dir=target.parent)
     try:
         with os.fdopen(handle, "wb") as stream:
@@ -143,16 +149,23 @@ def read(path: str | os.PathLike[str]) -> tuple[str, dict[str, Any], dict[str, N
     FileFormatError
         Not a ``.npz`` of this library, damaged, or of a newer version.
     """
+    name = os.fspath(path)
+    with open(path, "rb") as stream:  # no such file, no permission, a folder: in the system's own words
+        if not zipfile.is_zipfile(stream):
+            raise FileFormatError(f"'{name}' is {_NOT_OURS}: it is no .npz file")
     try:
         with np.load(path, allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
+    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as trouble:
+        raise FileFormatError(f"'{name}' is {_NOT_OURS}, or is damaged: its arrays cannot be read") from trouble
+    if _HEADER not in arrays:
+        held = ", ".join(arrays) or "none"
+        raise FileFormatError(f"'{name}' is {_NOT_OURS}: it has no header; its arrays are {held}")
+    try:
         outer = json.loads(bytes(arrays.pop(_HEADER)).decode())
         schema, version, header = outer["schema"], outer["version"], outer["header"]
-    except (OSError, ValueError, KeyError, TypeError, EOFError, AttributeError, zipfile.BadZipFile) as trouble:
-        if isinstance(trouble, (FileNotFoundError, PermissionError, IsADirectoryError)):
-            raise
-        message = f"'{os.fspath(path)}' is not a stored result of this library, or is damaged: {trouble}"
-        raise FileFormatError(message) from trouble
+    except (ValueError, KeyError, TypeError, AttributeError) as trouble:
+        raise FileFormatError(f"'{name}' is {_NOT_OURS}, or is damaged: its header cannot be read") from trouble
     if not isinstance(version, int) or version > _VERSION:
         raise FileFormatError(f"'{os.fspath(path)}' has format version {version}; this library reads up to {_VERSION}")
     if not isinstance(header, dict) or not isinstance(schema, str):
