@@ -26,6 +26,7 @@ from .locating import Found
 from .open_resonance import warn_if_open
 from .points import Point
 from .settings import Settings, checked, checked_problem
+from .settling import adapted_solution
 from .starting import born_sides, first_point, inside_window
 from .walking import Walk, ended
 
@@ -281,6 +282,8 @@ def extend(branch: Branch, *, max_points: int, window: Any, progress: Any) -> Br
 def solve(problem: Problem, *, start: Any = None, tolerance: float = 1e-9, **params: float) -> Any:
     """One solution of a problem, as FixedPoint or PeriodicOrbit.
 
+    Mesh, harmonics and samples of an orbit are adapted to it, as along a branch, where the problem is adaptive.
+
     Parameters
     ----------
     problem : Problem
@@ -325,4 +328,5 @@ def solve(problem: Problem, *, start: Any = None, tolerance: float = 1e-9, **par
             f"no solution: {found.note}; give start= nearer to one, for example the end of a simulation",
             last=u, iterations=found.iterations, note=found.note,
         )
+    problem, found = adapted_solution(problem, found, names[0], tolerance)
     return problem.view(found.u, found.params)
