@@ -387,3 +387,35 @@ def test_dead_ends_have_a_status_and_finite_points():
 def test_bad_input_is_typed(call):
     with pytest.raises(st.errors.StabilityError):
         call(st.Collocation(CASES["asymmetric"][0]))
+
+
+def test_a_bilinear_spring_doubles_where_its_simulation_does():
+    # x'' + .1 x' + x + 8 max(x - 1, 0) = cos w t: two doublings, between which the motion repeats after 2 T.
+    k = sp.Symbol("k")
+    system = oscillator(-d * x.diff(t) - x - k * sp.Max(x - 1, 0) + F * sp.cos(w * t), d=0.1, k=8.0, F=1.0, w=1.0)
+    branch = st.continuation(st.Shooting(system), "w", (0.5, 0.6))
+    low, high = branch.of_kind(st.Kind.PERIOD_DOUBLING)
+    assert low.params["w"] < high.params["w"]
+    swing = st.continuation(st.switch(low), "w", (0.5, 0.6))
+    assert swing.status is st.Status.CLOSED_LOOP
+
+    def strobes(value):
+        period = 2 * np.pi / value
+        run = solve_ivp(
+            lambda s, q: [q[1], -0.1 * q[1] - q[0] - 8 * max(q[0] - 1, 0) + np.cos(value * s)],
+            (0, 160 * period),
+            [1.0, 0.0],
+            rtol=1e-8,
+            atol=1e-9,
+            max_step=0.2,
+            t_eval=np.array([158, 159, 160]) * period,
+        )  # fmt: skip
+        return run.y[0]
+
+    for value in (0.522, 0.530, 0.540):
+        one, two, three = strobes(value)
+        doubled = low.params["w"] < value < high.params["w"]
+        assert abs(one - three) < 1e-4 and (abs(one - two) > 1e-2) == doubled
+        if doubled:
+            own = [o for o in swing.at(w=value) if o.verdict is st.Verdict.STABLE]
+            assert own and min(abs(o(0.0)[0] - v) for o in own for v in (one, two)) < 1e-4
