@@ -6,12 +6,12 @@ from typing import Any
 
 import click
 
+from ..constants import GRAVITY
 from ..errors import InputError
 from ._arguments import _number
 
 __all__ = ["ACCELERATION", "RANGE", "excited", "swept_parameter"]
 
-GRAVITY = 9.81
 _USUAL = ("frequency", "Omega", "omega", "eta")
 
 

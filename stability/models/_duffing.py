@@ -118,7 +118,7 @@ def from_physical(
     """
     positive(stiffness=stiffness)
     if amplitude is None and acceleration is None:
-        acceleration = 0.5 * 9.81
+        acceleration = 0.5 * GRAVITY
     k1, k3 = sp.symbols("stiffness cubic", real=True)
     system = single_degree(
         "duffing", "Duffing's oscillator on a moving base, SI units",

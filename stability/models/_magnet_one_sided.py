@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..constants import GRAVITY
 from ..errors import InputError
 from ._magnet_pairs import MagnetPair
 from ._magnet_springs import MagneticSpring
@@ -33,8 +34,6 @@ if TYPE_CHECKING:
     import sympy as sp
 
 __all__ = ["DipoleMagnetSpring", "OneSidedMagnetSpring"]
-
-GRAVITY = 9.81
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,12 @@ from typing import Any
 
 import sympy as sp
 
+from ..constants import GRAVITY
 from ..errors import InputError
 from ..systems.excitation import BaseMotion
 
 __all__ = ["GRAVITY", "Shaker", "positive", "shaker"]
 
-GRAVITY = 9.81
 t = sp.Symbol("t", real=True)
 
 

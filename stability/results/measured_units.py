@@ -2,7 +2,7 @@ r"""Units of measured columns: text such as mm, mm/s^2, deg, 1/min to a factor a
 
 A unit is a product of powers of symbols with prefixes, separated by / * . or a blank: ``kN/m``, ``mm/s²``, ``V/(m s)``.
 Frequencies stay frequencies: Hz, 1/min and rpm become Hz; rad/s stays rad/s, which is another quantity. A ``g`` is the
-standard acceleration of gravity, as on every shaker; masses are written kg.
+acceleration of gravity of the models (constants), ``g0`` the standard one, 9.80665 m/s^2; masses are written kg.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 
+from ..constants import GRAVITY
 from ..errors import InputError
 
 __all__ = ["si_unit"]
@@ -22,7 +23,7 @@ _SPECIAL: dict[str, tuple[float, str]] = {
     "": (1.0, "1"), "1": (1.0, "1"), "-": (1.0, "1"), "%": (0.01, "1"),
     "deg": (math.pi / 180, "rad"), "°": (math.pi / 180, "rad"), "degree": (math.pi / 180, "rad"),
     "degrees": (math.pi / 180, "rad"), "rpm": (1 / 60, "Hz"), "min": (60.0, "s"), "h": (3600.0, "s"),
-    "g": (9.80665, "m/s^2"), "g0": (9.80665, "m/s^2"), "kg": (1.0, "kg"), "in": (0.0254, "m"), "inch": (0.0254, "m"),
+    "g": (GRAVITY, "m/s^2"), "g0": (9.80665, "m/s^2"), "kg": (1.0, "kg"), "in": (0.0254, "m"), "inch": (0.0254, "m"),
     "Ω": (1.0, "Ohm"),
 }  # fmt: skip
 _WHOLE = {"1/min": (1 / 60, "Hz"), "min^-1": (1 / 60, "Hz"), "1/s": (1.0, "Hz"), "s^-1": (1.0, "Hz"),

@@ -36,8 +36,8 @@ def test_forms_of_text_are_one_response(tmp_path, form, encoding):
 
 
 @pytest.mark.parametrize(("text", "factor", "unit"), [
-    ("mm", 1e-3, "m"), ("µm", 1e-6, "m"), ("mm/s^2", 1e-3, "m/s^2"), ("m/s²", 1.0, "m/s^2"), ("g", 9.80665, "m/s^2"),
-    ("kN/m", 1e3, "N/m"), ("rpm", 1 / 60, "Hz"), ("kHz", 1e3, "Hz"), ("rad/s", 1.0, "rad/s"), ("mV", 1e-3, "V"),
+    ("mm", 1e-3, "m"), ("µm", 1e-6, "m"), ("mm/s^2", 1e-3, "m/s^2"), ("m/s²", 1.0, "m/s^2"), ("g", 9.81, "m/s^2"),
+    ("g0", 9.80665, "m/s^2"), ("kN/m", 1e3, "N/m"), ("rpm", 1 / 60, "Hz"), ("kHz", 1e3, "Hz"), ("rad/s", 1.0, "rad/s"), ("mV", 1e-3, "V"),
     ("%", 0.01, "1"), ("", 1.0, "1"), ("deg", np.pi / 180, "rad"), ("MPa", 1e6, "Pa"), ("V/(m s)", 1.0, "V/(m s)"),
     ("ms", 1e-3, "s"), ("min", 60.0, "s"), ("mW", 1e-3, "W"), ("deg/s", np.pi / 180, "rad/s"),
 ])  # fmt: skip
@@ -89,7 +89,7 @@ def test_names(tmp_path):
     plain = st.load_response(path)
     assert plain.name == "base_acceleration" and list(plain.columns) == ["sensor_1", "sensor_2"]
     named = st.load_response(path, names={"base acceleration": "acceleration", "sensor 1": "y.amplitude", "sensor 2": "y.pp"})
-    assert named.name == "acceleration" and named.parameter == pytest.approx([0.980665, 1.96133])
+    assert named.name == "acceleration" and named.parameter == pytest.approx([0.981, 1.962])
     assert named.values("y.amplitude(1)") == pytest.approx([1e-3, 2e-3])
     assert st.load_response(path, parameter="sensor_1").name == "sensor_1"
     with pytest.raises(UnknownNameError, match="did you mean 'sensor 1'"):
@@ -179,3 +179,11 @@ def test_drawn_over_a_branch_on_the_command_line(linear, tmp_path, capsys):
     assert "runs along frequency" in capsys.readouterr().err
     assert main(["plot", str(tmp_path / "b.npz"), "--data", str(tmp_path / "b.npz"), "-o", str(tmp_path / "d.png")]) != 0
     assert not (tmp_path / "d.png").exists()
+
+
+def test_one_acceleration_of_gravity():
+    """0.5 g of a measured column, of the command line and of a model's default are the same 4.905 m/s^2."""
+    from stability.cli._motions import ACCELERATION
+
+    assert 0.5 * si_unit("g")[0] == ACCELERATION.convert("0.5g", None, None) == 4.905
+    assert st.models.duffing.from_physical().parameters["acceleration"] == 4.905
