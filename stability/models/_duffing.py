@@ -17,7 +17,7 @@ from ..systems.system import System
 from ._builder import Coil
 from ._linear import single_degree
 from ._model import model
-from ._shaker import positive
+from ._shaker import GRAVITY, positive
 
 __all__ = ["duffing", "duffing_mathieu", "duffing_textbook"]
 
