@@ -158,6 +158,16 @@ class HarmonicBalance(OrbitDiscretisation):
         """Forcing periods per orbit, the same number as `subharmonic`."""
         return self.subharmonic
 
+    @property
+    def advice(self) -> str:
+        """More harmonics, where their number was given."""
+        if self.adaptive:
+            return ""
+        of = f"; of an orbit of {self.subharmonic} periods the forcing is harmonic {self.subharmonic}, and" * (
+            self.subharmonic > 1
+        )
+        return f"{of or ';'} harmonics={self.harmonics} may be too few: give more, or leave them away and they grow"
+
     @cached_property
     def own(self) -> int:  # type: ignore[override]
         """1 where the period is an unknown."""

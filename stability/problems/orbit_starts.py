@@ -132,7 +132,7 @@ def _failed(problem: OrbitDiscretisation, params: Array, found: Corrected, what:
     return ConvergenceError(
         f"Newton's method did not reach a periodic orbit of '{problem.system.name}' from {what} ({found.note}; "
         f"residual {found.residual:.1e}) at {where}; give a state near the orbit, an orbit of another method, or start "
-        "at another parameter value",
+        f"at another parameter value{problem.advice}",
         residual=found.residual, iterations=found.iterations, u=found.u, params=params,
     )  # fmt: skip
 

@@ -109,6 +109,11 @@ class OrbitDiscretisation:
         """Multipliers leave at +1, -1 or as a pair."""
         return _CRITICAL
 
+    @property
+    def advice(self) -> str:
+        """What of the discretisation to change where no orbit is found; begins with a semicolon, or empty."""
+        return ""
+
     def index(self, name: str) -> int:
         """Place of a parameter in p."""
         return self.flow.place(name)

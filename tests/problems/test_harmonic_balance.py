@@ -7,7 +7,7 @@ import pytest
 import sympy as sp
 
 import stability as st
-from stability.errors import InputError, TruncationWarning
+from stability.errors import ConvergenceError, InputError, TruncationWarning
 from stability.problems.harmonic_spectrum import independent_multipliers
 from stability.problems.orbit_spectrum import spectrum_distance
 
@@ -341,3 +341,11 @@ def test_an_autonomous_system_has_no_subharmonic():
         st.HarmonicBalance(st.models.van_der_pol(), subharmonic=2)
     with pytest.raises(InputError, match="start"):
         st.continuation(st.HarmonicBalance(st.models.van_der_pol()), "mu", (0.1, 1.0))
+
+
+def test_too_few_harmonics_are_named_where_nothing_converges():
+    """A pendulum that swings by 90 degrees at half of the forcing's frequency; with one harmonic it has no such orbit."""
+    system = st.models.base_driven_pendulum(epsilon=0.5, xi=0.02, Omega=1.8)
+    with pytest.raises(ConvergenceError, match=r"forcing is harmonic 2, and harmonics=1 may be too few: give more"):
+        st.solve(st.HarmonicBalance(system, harmonics=1, subharmonic=2), start=dict(phi=1.0))
+    assert st.HarmonicBalance(system, subharmonic=2).advice == ""
