@@ -2,7 +2,8 @@ r"""From a located special point of any problem class to its normal form.
 
 Equilibria give the derivatives of their field, collocation those of its discrete period map; an orbit of another
 method (harmonic balance, shooting) is first solved again by collocation on its own period, from which the derivatives
-then come. See `normal_forms` for coefficients and words.
+then come. See `normal_forms` for coefficients and words. An orbit that passes a kink of its right-hand side (`kinks`)
+has neither: its period map is not made of derivatives of the field alone.
 
 *Accuracy*: derivatives are exact for the discrete problem; a coefficient is off by the relative discretisation error of
 the orbit. Systems given by Python functions have derivatives by differences: third ones are known to about 1e-4.
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 
 from ..errors import StabilityError
 from ..words import Kind
+from .kinks import passes_a_kink
 from .normal_forms import FieldForms, NormalForm, normal_form
 from .normal_forms_orbits import MapForms
 
@@ -35,6 +37,8 @@ def criticality_of(problem: Any, kind: Kind, u: Array, params: Array, linearisat
     if kind not in _KINDS:
         return _NONE
     try:
+        if hasattr(problem, "discretise") and passes_a_kink(problem.system, problem.view(u, params)):
+            return _NONE
         forms = _forms(problem, u, params, linearisation)
         if forms is None or not np.isfinite(forms.matrix).all():
             return _NONE

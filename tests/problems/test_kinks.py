@@ -1,0 +1,60 @@
+"""Orbits through a kink have no coefficient made of derivatives of the field; those beside it have.
+
+Witness: a bilinear spring that is touched or not; the doubling at w = 0.524276 is supercritical (orbits beyond it are
+stable, their size grows as the root of the distance), and its field is linear on either side: all derivatives vanish.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import stability as st
+from stability.problems.kinks import passes_a_kink
+
+t = sp.Symbol("t", real=True)
+x = sp.Function("x")(t)
+
+
+def bilinear(w: float, gap: float = 1.0, force: float = 1.0) -> st.System:
+    """x'' + x'/10 + x + 8 max(x - gap, 0) = force cos(w t)."""
+    W = sp.Symbol("w", real=True)
+    spring = x + 8 * sp.Max(x - gap, 0)
+    equation = {x.diff(t, 2): force * sp.cos(W * t) - x.diff(t) / 10 - spring}
+    return st.System.from_equations(equation, [x], parameters=dict(w=w), period=2 * sp.pi / W)
+
+
+@pytest.mark.parametrize(("gap", "passed"), [(1.0, True), (5.0, False)])
+def test_an_orbit_passes_its_stop_or_not(gap: float, passed: bool) -> None:
+    """Amplitude 1/|1 - w^2 + i w/10| = 1.33 of the linear motion at w = 0.5."""
+    system = bilinear(0.5, gap)
+    orbit = st.solve(st.Shooting(system))
+    assert passes_a_kink(system, orbit) is passed is bool(orbit.max["x"] > gap)
+
+
+def test_smooth_systems_have_no_kinks() -> None:
+    system = st.models.duffing()
+    assert not passes_a_kink(system, st.solve(st.Collocation(system)))
+
+
+def test_a_doubling_through_a_kink_has_no_word() -> None:
+    branch = st.continuation(st.Shooting(bilinear(0.5)), "w", (0.5, 0.53))
+    point = branch["PD1"]
+    assert abs(point.params["w"] - 0.5242755675) < 1e-8
+    assert point.coefficient is None and point.criticality is None
+    doubled = st.continuation(st.switch(point), "w", (0.5, 0.53), max_points=6)
+    side = doubled.parameter[1:] - point.params["w"]
+    assert doubled.verdicts[-1] is st.Verdict.STABLE and (side > 0).all()  # "degenerate" would be wrong
+
+
+def test_a_fold_on_the_soft_side_keeps_its_coefficient() -> None:
+    """A term with a kink that is never reached changes nothing."""
+    system = st.models.duffing(xi=0.02, beta=0.001)
+    u = sp.Symbol("u", real=True)
+    other = st.System(
+        name="guarded", coordinates=system.coordinates, states=system.states, parameters=dict(system.parameters),
+        rhs=(system.rhs[0], system.rhs[1] - sp.Max(u - 100, 0)), period_expression=system.period_expression,
+    )  # fmt: skip
+    folds = [st.continuation(st.Collocation(s), "Omega", (0.9, 1.5))["LP1"] for s in (system, other)]
+    np.testing.assert_allclose(folds[1].coefficient, folds[0].coefficient, rtol=1e-6)
