@@ -25,9 +25,9 @@ import sympy as sp
 from sympy.core.relational import Relational
 from sympy.logic.boolalg import Boolean
 
-__all__ = ["Frozen", "frozen_switches", "has_switches"]
+__all__ = ["SWITCHES", "Frozen", "frozen_switches", "has_switches"]
 
-_SWITCHES = (sp.Abs, sp.sign, sp.Heaviside, sp.Max, sp.Min, sp.Piecewise)
+SWITCHES = (sp.Abs, sp.sign, sp.Heaviside, sp.Max, sp.Min, sp.Piecewise)
 _MOST = 24  # more guards than this (a spring of many pieces) cost more than they give
 
 
@@ -68,7 +68,7 @@ class Frozen:
 
     def rewrite(self, node: sp.Basic) -> sp.Basic:
         """The expression with modes in place of signs."""
-        if not node.args or not node.has(*_SWITCHES):
+        if not node.args or not node.has(*SWITCHES):
             return node
         if node not in self._done:
             self._done[node] = self._rewritten(node)
@@ -112,7 +112,7 @@ class Frozen:
         value = self.rewrite(better)
         for other in node.args[1:]:
             gap = better - other if isinstance(node, sp.Max) else other - better
-            if not self.switches(gap) or gap.has(*_SWITCHES):
+            if not self.switches(gap) or gap.has(*SWITCHES):
                 return self._located(node)
             chosen = self.mode(gap) > 0
             value = sp.Piecewise((value, chosen), (self.rewrite(other), True), evaluate=False)
@@ -134,7 +134,7 @@ class Frozen:
 @lru_cache(maxsize=256)
 def has_switches(system: Any) -> bool:
     """Whether the right-hand side has kinks or jumps in the states."""
-    if system.rhs is None or not any(e.has(*_SWITCHES) for e in system.rhs):
+    if system.rhs is None or not any(e.has(*SWITCHES) for e in system.rhs):
         return False
     return bool(frozen_switches(system)[0].guards)
 

@@ -2,8 +2,8 @@ r"""From a located special point of any problem class to its normal form.
 
 Equilibria give the derivatives of their field, collocation those of its discrete period map; an orbit of another
 method (harmonic balance, shooting) is first solved again by collocation on its own period, from which the derivatives
-then come. See `normal_forms` for coefficients and words. An orbit that passes a kink of its right-hand side (`kinks`)
-has neither: its period map is not made of derivatives of the field alone.
+then come. See `normal_forms` for coefficients and words. An orbit that passes a kink of its right-hand side, or an
+equilibrium on one, has neither where the coefficient would feel it (`kinks`): derivatives of the field are not all then.
 
 *Accuracy*: derivatives are exact for the discrete problem; a coefficient is off by the relative discretisation error of
 the orbit. Systems given by Python functions have derivatives by differences: third ones are known to about 1e-4.
@@ -17,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import StabilityError
+from ..integration.switches import has_switches
 from ..words import Kind
-from .kinks import passes_a_kink
+from .kinks import SMOOTH, smoothness, smoothness_along
 from .normal_forms import FieldForms, NormalForm, normal_form
 from .normal_forms_orbits import MapForms
 
@@ -37,7 +38,7 @@ def criticality_of(problem: Any, kind: Kind, u: Array, params: Array, linearisat
     if kind not in _KINDS:
         return _NONE
     try:
-        if hasattr(problem, "discretise") and passes_a_kink(problem.system, problem.view(u, params)):
+        if _smoothness(problem, u, params) < (2 if kind is Kind.FOLD else 3):
             return _NONE
         forms = _forms(problem, u, params, linearisation)
         if forms is None or not np.isfinite(forms.matrix).all():
@@ -45,6 +46,15 @@ def criticality_of(problem: Any, kind: Kind, u: Array, params: Array, linearisat
         return _of_whole_period(problem, kind, normal_form(kind, forms, problem.critical.circle))
     except (np.linalg.LinAlgError, StabilityError):
         return _NONE
+
+
+def _smoothness(problem: Any, u: Array, params: Array) -> int:
+    """Order of the sharpest kink that the equilibrium or orbit meets (see `kinks`)."""
+    if not has_switches(problem.system):
+        return SMOOTH
+    if hasattr(problem, "discretise"):
+        return smoothness_along(problem.system, problem.view(u, params))
+    return smoothness(problem.system, np.zeros(1), np.array(u, float)[None, : problem.system.n], params)
 
 
 def _of_whole_period(problem: Any, kind: Kind, found: NormalForm) -> NormalForm:

@@ -145,7 +145,8 @@ class SpecialPoint:
         """Where the new solutions live: SUPERCRITICAL (they attract), SUBCRITICAL, DEGENERATE; None: no such word.
 
         Of Hopf, pitchfork, period-doubling and Neimark-Sacker points; of a fold only DEGENERATE (a cusp). Near the
-        strong resonances exp(i k theta) = 1, k <= 4, a torus coefficient does not decide: None.
+        strong resonances exp(i k theta) = 1, k <= 4, a torus coefficient does not decide: None. Nor is there one where
+        the solution meets a kink or jump of the right-hand side that the coefficient feels (problems/kinks.py).
         """
         return self._normal_form[1]
 

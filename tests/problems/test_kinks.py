@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 import stability as st
-from stability.problems.kinks import passes_a_kink
+from stability.problems.kinks import SMOOTH, passes_a_kink, smoothness, smoothness_along
 
 t = sp.Symbol("t", real=True)
 x = sp.Function("x")(t)
@@ -58,3 +58,25 @@ def test_a_fold_on_the_soft_side_keeps_its_coefficient() -> None:
     )  # fmt: skip
     folds = [st.continuation(st.Collocation(s), "Omega", (0.9, 1.5))["LP1"] for s in (system, other)]
     np.testing.assert_allclose(folds[1].coefficient, folds[0].coefficient, rtol=1e-6)
+
+
+def forced(term: sp.Expr) -> st.System:
+    """x'' + x'/20 + x + term = cos(t) / 2."""
+    equation = {x.diff(t, 2): sp.cos(t) / 2 - x.diff(t) / 20 - x - term}
+    return st.System.from_equations(equation, [x], parameters=dict(w=1.0), period=2 * sp.pi)
+
+
+@pytest.mark.parametrize(("power", "order"), [(1, 1), (2, 2), (3, 3)])
+def test_order_of_a_kink(power: int, order: int) -> None:
+    """max(x - 1/4, 0)^r has r - 1 continuous derivatives, so that the r-th one jumps."""
+    system = forced(sp.Max(x - sp.Rational(1, 4), 0) ** power)
+    assert smoothness_along(system, st.solve(st.Collocation(system))) == order
+
+
+def test_a_jump_is_of_order_zero_and_staying_on_a_kink_costs_one_order() -> None:
+    system = forced(sp.sign(x.diff(t)) / 10)
+    assert smoothness_along(system, st.solve(st.Shooting(system))) == 0
+    drag = forced(sp.Abs(x.diff(t)) * x.diff(t))
+    rest = np.zeros((5, 2))
+    assert smoothness(drag, np.zeros(5), rest, drag.parameter_vector()) == 1
+    assert smoothness(drag, np.zeros(5), rest + [0.0, 1.0], drag.parameter_vector()) == SMOOTH
