@@ -28,6 +28,8 @@ _DEGREE = 7
 # local nodes in [0, 1] of a polynomial of degree 7; the ends are among them, so that pieces join exactly
 NODES: Array = 0.5 - 0.5 * np.cos(np.pi * np.arange(_DEGREE + 1) / _DEGREE)
 _BISECTIONS = 52
+_ROUNDING = 4 * float(np.finfo(float).eps)  # over the size of a piece: what has no sign
+_JUMP = 1e-9  # over the size of the pieces: what joins
 
 
 @cache
@@ -94,31 +96,67 @@ def restricted(edges: Array, coefficients: Array, t0: float, t1: float) -> tuple
     return cut, part
 
 
-def crossings(edges: Array, column: Array, direction: int = 0, parts: int = 16) -> Array:
-    """Times at which a column (K, d + 1) changes its sign: bracketed on a grid of `parts` a piece, then bisected.
+def crossings(edges: Array, column: Array, direction: int = 0, parts: int = 16, level: float = 0.0) -> Array:
+    """Times in (e_0, e_K] at which a column (K, d + 1) passes from one side of `level` to the other.
 
-    direction +1 keeps upward crossings, -1 downward ones. A jump over zero between two pieces is no crossing.
+    direction +1 keeps upward crossings, -1 downward ones. The end of a step belongs to one of its two pieces only; a
+    value within rounding of the level has the sign of the one before, so that a touch is no crossing, and an arrival at
+    the very end is one. A jump over the level between two pieces is no crossing.
+    """
+    shifted = np.array(column, float)
+    shifted[:, 0] -= level
+    size = np.abs(column).sum(axis=1) + abs(level)
+    around = np.concatenate([size[:1], size, size[-1:]])
+    noise = _ROUNDING * np.maximum(np.maximum(around[:-2], around[2:]), size)
+    return _passages(edges, shifted, noise, _joined(column), direction, parts)
+
+
+def _joined(column: Array) -> Array:
+    """(K - 1,) bool: whether a column (K, d + 1) goes on without a jump from one piece to the next."""
+    ends, starts = column[:-1].sum(axis=1), column[1:] @ (-1.0) ** np.arange(column.shape[1])
+    size = np.abs(column).sum(axis=1)
+    return np.asarray(np.abs(ends - starts) <= _JUMP * np.maximum(size[:-1], size[1:]))
+
+
+def _passages(edges: Array, column: Array, noise: Array, joined: Array, direction: int, parts: int) -> Array:
+    """Sign changes of a column between samples in a row, bracketed on a grid of `parts` a piece, then bisected.
+
+    Samples within `noise` (K,) have no sign; a sample at a joint is that of the later piece. Between two samples of
+    opposite signs with others of none between them, the passage is where the first sign ends.
     """
     theta = np.linspace(0, 1, parts + 1)
-    basis = chebyshev.chebvander(2 * theta - 1, column.shape[1] - 1)
-    values = column @ basis.T
-    signs = np.where(values >= 0, 1, -1)
-    change = np.diff(signs, axis=1)
-    piece, place = np.nonzero(change if direction == 0 else change == 2 * direction)
+    values = column @ chebyshev.chebvander(2 * theta - 1, column.shape[1] - 1).T
+    signs = np.where(np.abs(values) <= noise[:, None], 0, np.sign(values)).astype(int)
+    kept = np.ones(values.shape, bool)
+    kept[:-1, -1] = ~joined
+    stretch = np.broadcast_to(np.concatenate([[0], np.cumsum(~joined)])[:, None], values.shape)[kept]
+    piece, place, sign = *np.nonzero(kept), signs[kept]
+    if sign.size and sign[-1] == 0:  # where it arrives at the end, it has passed
+        before = np.nonzero((sign != 0) & (stretch == stretch[-1]))[0]
+        sign[-1] = -sign[before[-1]] if before.size else 0
+    known = np.nonzero(sign)[0]
+    first, second = known[:-1], known[1:]
+    change = np.where(stretch[first] == stretch[second], sign[second] - sign[first], 0)
+    start = first[change != 0 if direction == 0 else change == 2 * direction]
+    piece, place, left = piece[start], place[start], sign[start]
     lo, hi = theta[place], theta[place + 1]
-    left = signs[piece, place]
     for _ in range(_BISECTIONS):
         middle = 0.5 * (lo + hi)
         value = np.einsum("ki,ki->k", chebyshev.chebvander(2 * middle - 1, column.shape[1] - 1), column[piece])
-        same = np.where(value >= 0, 1, -1) == left
+        same = value * left > 0
         lo, hi = np.where(same, middle, lo), np.where(same, hi, middle)
     return np.asarray(edges[piece] + (edges[piece + 1] - edges[piece]) * 0.5 * (lo + hi))
 
 
 def extrema(edges: Array, column: Array) -> tuple[Array, Array, Array]:
-    """(times, values, signs): local extrema of a column (K, d + 1), sign +1 for a maximum, -1 for a minimum."""
+    """(times, values, signs): local extrema of a column (K, d + 1), sign +1 for a maximum, -1 for a minimum.
+
+    Where the column has a corner between two pieces its slope jumps, and the corner is an extremum like any other.
+    """
     slope = derivative(edges, column[..., None])[..., 0]
-    tops, bottoms = crossings(edges, slope, -1), crossings(edges, slope, +1)
+    steepest = 2 * (column.shape[1] - 1) ** 2 / np.diff(edges)  # of a polynomial over its size: Markov's inequality
+    noise, joined = _ROUNDING * np.abs(column).sum(axis=1) * steepest, _joined(column)
+    tops, bottoms = (_passages(edges, slope, noise, joined, way, 16) for way in (-1, +1))
     times = np.concatenate([tops, bottoms])
     signs = np.concatenate([np.ones(tops.size), -np.ones(bottoms.size)])
     order = np.argsort(times, kind="stable")

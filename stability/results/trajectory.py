@@ -260,10 +260,11 @@ class Trajectory:
         return piecewise.extrema(self.edges, self._column(name))
 
     def crossings(self, name: str, value: float = 0.0, direction: int = 0) -> Array:
-        """Times at which a state or output passes `value` (direction +1 upwards, -1 downwards, 0 both)."""
-        column = np.array(self._column(name))
-        column[:, 0] -= value
-        return piecewise.crossings(self.edges, column, direction)
+        """Times in (t0, t1] at which a state or output passes `value` (direction +1 upwards, -1 downwards, 0 both).
+
+        Each passage is there once, also on the end of a step; a touch and a jump over the value are none.
+        """
+        return piecewise.crossings(self.edges, self._column(name), direction, level=value)
 
     def harmonic(self, k: int, name: str, periods: int = 1) -> complex:
         """c_k = mean of x exp(-2 pi i k t / T) over the last whole forcing periods; amplitude 2 |c_k| for k >= 1.
