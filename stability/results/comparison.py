@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..words import Verdict
+from .method_names import called
 from .solutions import frozen
 from .storage import register
 from .sweep import Sweep
@@ -134,9 +135,10 @@ class Comparison:
     def __getitem__(self, name: str) -> Difference:
         from ..errors import unknown_name
 
-        if name not in self.differences:
+        known = called(name, self.differences)
+        if known is None:
             raise unknown_name("method", name, self.differences, "this comparison")
-        found: Difference = self.differences[name]
+        found: Difference = self.differences[known]
         return found
 
     def _ipython_key_completions_(self) -> list[str]:

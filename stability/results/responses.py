@@ -16,6 +16,7 @@ from .branch import Branch
 from .bundles import packed, unpacked
 from .comparison import Comparison, distinct, swept
 from .measured import MeasuredResponse
+from .method_names import called
 from .storage import register, write, write_columns
 from .sweep import Sweep
 
@@ -55,14 +56,16 @@ class Responses(Mapping[str, Any]):
         return self.comparison.quantity
 
     def __getitem__(self, method: str) -> Any:
-        if method in self.comparison.names:
-            return self.comparison.curves[self.comparison.names.index(method)]
-        if method in self.failures:
-            raise self.failures[method]
+        known = called(method, self.comparison.names)
+        if known is not None:
+            return self.comparison.curves[self.comparison.names.index(known)]
+        failed = called(method, self.failures)
+        if failed is not None:
+            raise self.failures[failed]
         raise unknown_name("method", method, [*self, *self.failures], "this response")
 
     def __contains__(self, method: object) -> bool:
-        return method in self.comparison.names
+        return isinstance(method, str) and called(method, self.comparison.names) is not None
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.comparison.names)

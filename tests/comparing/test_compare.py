@@ -43,6 +43,18 @@ def test_methods_against_collocation(results):
     assert all(abs(there - here) < 1e-9 for here, there in folds.items())
 
 
+def test_methods_are_found_by_either_name(results):
+    """As `responses` calls them and as tables do: the very same entry."""
+    c = st.compare(results["full"], results["slow"], results["hb7"], results["up"], points=3)
+    for word, name in (("hb7", "harmonic balance 7"), ("averaging", "averaging"), ("sweep-up", "sweep up")):
+        assert c[word] is c[name]
+    with pytest.raises(UnknownNameError, match="no method 'hb9'"):
+        c["hb9"]
+    r = st.responses(st.models.duffing(xi=0.02, beta=0.001), "Omega", (0.5, 0.7), ("hb3", "averaging2"), points=3)
+    assert list(r) == ["hb3", "averaging2"] and "harmonic balance 3" in r and "hb5" not in r
+    assert r["averaging, order 2"] is r["averaging2"]
+
+
 def test_what_a_method_misses_is_counted(results):
     """Between its own top fold and the true one, one-harmonic balance has one solution, the truth three."""
     c = st.compare(results["full"], results["hb1"], points=541)
