@@ -165,6 +165,7 @@ class Follower(Iterator[Point]):
             doubts += 1
             h = 0.3 * made[1].distance
         self.status = Status.STEP_TOO_SMALL
+        self.note += getattr(self.last.problem, "doubt", "")
         return None
 
     def _try(self, h: float) -> tuple[Point, Comparison] | float:

@@ -31,6 +31,7 @@ from ..kernels.meshes import uniform_edges
 from ..protocols import Corrected, Spectrum, Tangent
 from ..systems.stops import refuse_stops
 from .collocation_error import carried_to, multiplier_error, node_error
+from .collocation_kinks import kink_advice, kink_error, passage
 from .collocation_linearisation import CollocationLinearisation, Workspace
 from .orbit_adaption import adapted
 from .orbit_mesh import OrbitMesh
@@ -115,6 +116,7 @@ class Collocation(OrbitDiscretisation):
     automatic: bool = False
     mirror: Any = None
     _memo: dict[str, Any] = field(default_factory=dict, repr=False)
+    _warned: set[str] = field(default_factory=set, repr=False)
 
     def __post_init__(self) -> None:
         refuse_stops(self.system, "Collocation")
@@ -146,6 +148,11 @@ class Collocation(OrbitDiscretisation):
             object.__setattr__(self, name, value)
         object.__setattr__(self, "winding", winding_vector(self.system, self.winding))
         object.__setattr__(self, "mesh", OrbitMesh(edges, self.degree, n, self.span, self.own))
+
+    @property
+    def doubt(self) -> str:
+        """Kinks in the equations, where a branch stops."""
+        return kink_advice(self.system)
 
     def break_points(self, params: Array) -> Array:
         """Breaks of the forcing at `params` as points s of the orbit, ascending, in [0, 1)."""
@@ -383,13 +390,15 @@ class Collocation(OrbitDiscretisation):
 
     # ------------------------------------------------------------------ spectrum and error
     def error(self, u: Array, params: Array) -> float:
-        """Largest error of the nodes and of the period over their scales, by degree m + 1; inf: unknown."""
-        return node_error(self, u, params)
+        """Largest error of nodes and period over their scales, by degree m + 1 and past kinks; inf: unknown."""
+        found = passage(self, u, params)
+        return max(node_error(self, u, params), 0.0 if found is None else found.nodes)
 
     def spectrum(self, linearisation: Any) -> Spectrum:
         """Multipliers, their error, counts, verdict.
 
-        The error is that by degree m + 1, the trivial multiplier's distance from 1, and Liouville's gap together.
+        The error is that by degree m + 1, the trivial multiplier's distance from 1, Liouville's gap and, where the orbit
+        passes a kink, twice the distance from multipliers by integration (`collocation_kinks`) together.
         """
         M, error = linearisation.spectral, 0.0
         largest = float(np.abs(M).max())
@@ -400,7 +409,7 @@ class Collocation(OrbitDiscretisation):
             M, error = deflated(M, direction)
         values = eigenvalues(M)
         error += multiplier_error(self, linearisation, values, direction if self.mesh.own else None)
-        error += 1e-15 * largest * len(M)
+        error += kink_error(self, linearisation, values) + 1e-15 * largest * len(M)
         factors = linearisation.work.M
         if self.halved:
             factors = np.concatenate([factors, self.closure[None]])  # S^-1 = S

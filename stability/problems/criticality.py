@@ -3,7 +3,7 @@ r"""From a located special point of any problem class to its normal form.
 Equilibria give the derivatives of their field, collocation those of its discrete period map; an orbit of another
 method (harmonic balance, shooting) is first solved again by collocation on its own period, from which the derivatives
 then come. See `normal_forms` for coefficients and words. An orbit that passes a kink of its right-hand side, or an
-equilibrium on one, has neither where the coefficient would feel it (`kinks`): derivatives of the field are not all then.
+equilibrium on one, has neither where the coefficient would feel it (`kinks`): derivatives of the field are not all.
 
 *Accuracy*: derivatives are exact for the discrete problem; a coefficient is off by the relative discretisation error of
 the orbit. Systems given by Python functions have derivatives by differences: third ones are known to about 1e-4.

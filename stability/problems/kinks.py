@@ -99,8 +99,8 @@ def kink_words(system: Any) -> str:
     Examples
     --------
     >>> import stability as st
-    >>> kink_words(st.System.from_equations("x'' + x + 8*max(x - 1, 0) = cos(w*t)", parameters=dict(w=1.0)))
-    'Max'
+    >>> kink_words(st.models.soft_stop_oscillator())
+    'Max, Min, Piecewise'
     """
     if not has_switches(system):
         return ""
