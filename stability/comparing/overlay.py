@@ -26,6 +26,7 @@ from .matching import matched
 __all__ = ["compare", "difference"]
 
 Array = NDArray[np.float64]
+_BESIDE = 1e-3  # of the grid's step: how far from a fold solutions are compared
 
 
 def compare(
@@ -44,7 +45,7 @@ def compare(
         Compared column, ``"<coordinate>.amplitude(1)"`` or ``"<state>.max"``; by default the fundamental amplitude of
         the reference's first coordinate. Extrema of a slow flow are those of the reconstructed motion.
     points : int
-        How many values of the parameter branches are compared at.
+        How many values of the parameter branches are compared at; one on a fold is moved off it by 1e-3 of the step.
 
     Returns
     -------
@@ -129,13 +130,26 @@ def _branch_difference(name: str, base: Curves, other: Curves, points: int) -> D
     matches: list[tuple[float, float, float, Verdict]] = []
     missing: list[tuple[float, Verdict, float]] = []
     extra: list[tuple[float, Verdict, float]] = []
-    for value in np.linspace(low, high, points).tolist():
+    for value in _values(low, high, points, [*base.folds, *other.folds]):
         here, there = base.rows(value), other.rows(value)
         pairs, alone, more = matched(here, there)
         matches += [(value, here[i][1], there[j][1], here[i][0]) for i, j in pairs]
         missing += [(value, here[i][0], here[i][1]) for i in alone]
         extra += [(value, there[j][0], there[j][1]) for j in more]
     return _difference(name, matches, missing, extra, _folds(base.folds, other.folds))
+
+
+def _values(low: float, high: float, points: int, folds: list[float]) -> list[float]:
+    """Where branches are compared: an even grid, off the folds.
+
+    At a fold two solutions are one, without a verdict, and rounding decides which method has none, one or two.
+    """
+    clear = _BESIDE * (high - low) / (points - 1)
+    grid = np.linspace(low, high, points)
+    for fold in folds:
+        inwards = 1.0 if fold < 0.5 * (low + high) else -1.0
+        grid[np.abs(grid - fold) < clear] = fold + inwards * clear
+    return [float(value) for value in grid if low <= value <= high]
 
 
 def _points_difference(name: str, base: Curves, at: Array, values: Array) -> Difference:

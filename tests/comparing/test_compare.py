@@ -64,6 +64,19 @@ def test_what_a_method_misses_is_counted(results):
     assert {v for _, v in near_the_top} == {S, U}
 
 
+@pytest.mark.parametrize("stopped_is_reference", [False, True])
+def test_a_branch_that_stops_at_its_fold_is_matched_with_its_own_sheet(stopped_is_reference):
+    """Below the top fold collocation has the same upper solution; its lower one (amplitude 0.2 for 2.5) is another."""
+    duffing = st.models.duffing(xi=0.02, beta=0.001)
+    whole = st.continuation(st.Collocation(duffing), "Omega", (0.3, 3.0))
+    part = st.continuation(st.HarmonicBalance(duffing, harmonics=9), "Omega", (0.3, 3.0), stop_at=("LP",))
+    pair = (part, whole) if stopped_is_reference else (whole, part)
+    (found,) = st.compare(*pair, points=15).differences.values()
+    assert found.parameter.size == 15 and found.worst < 1e-7
+    left, none = (found.extra, found.missing) if stopped_is_reference else (found.missing, found.extra)
+    assert {verdict for _, verdict, _ in left} == {S, U} and not none
+
+
 def test_table_plot_and_columns(results):
     import matplotlib.pyplot as plt
 
