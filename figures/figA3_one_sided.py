@@ -144,7 +144,7 @@ def draw_impacts(data: dict[str, Any], axis: Any) -> None:
                       textcoords="offset points", fontsize="small")
     grazing = data["quiet"]["GR1"]
     axis.plot(grazing.params["frequency"], 0.0, **style.marker(grazing.kind), clip_on=False)
-    axis.set(xlabel="$f$ (Hz)", ylabel="impact speed (mm/s)", xlim=(18, 35), ylim=(0, None))
+    axis.set(xlabel="$f$ (Hz)", ylabel="impact speed (mm/s)", xlim=(18, 35), ylim=(0, 108))
 
 
 def main(folder: Path | str = _figure.OUT) -> list[Path]:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, unknown_name
 from ..words import Kind, Verdict
 from .curves import smooth_pieces
+from .labels import write_label
 from .style import SERIES, axis_label, line, marker
 
 if TYPE_CHECKING:
@@ -109,7 +110,8 @@ def plot_branch(
         place = (float(abscissa[index]), float(ordinate[index]))
         artists += ax.plot([place[0]], [place[1]], zorder=3, **marker(point.kind, color))
         if labels:
-            artists.append(_written(ax, point.name or point.label, place, color, below=point.name.startswith(_PARENT)))
+            below = point.name.startswith(_PARENT)
+            artists.append(write_label(ax, point.name or point.label, place, color, below))
     ax.set_xlabel(axis_label(x))
     ax.set_ylabel(axis_label(y))
     return artists
@@ -131,17 +133,6 @@ def _marked(branch: Branch, kinds: tuple[Kind, ...] | None) -> Iterator[tuple[in
         point = branch.special[mark]
         if (point.kind is not Kind.USER or bool(point.name)) if kinds is None else point.kind in kinds:
             yield index, point
-
-
-def _written(ax: Any, text: str, place: tuple[float, float], color: str, below: bool = False) -> Any:
-    """A label beside a point, with a white halo, so that it stays readable on a line; below what its parent writes."""
-    from matplotlib.patheffects import withStroke
-
-    halo = [withStroke(linewidth=1.5, foreground="white")]
-    return ax.annotate(
-        text, place, xytext=(4, -11 if below else 4), textcoords="offset points", fontsize="small", color=color,
-        zorder=2.5, path_effects=halo,
-    )  # fmt: skip
 
 
 def plot_orbit(

@@ -143,3 +143,21 @@ def test_an_orbit_is_drawn_in_the_states_asked_for() -> None:
     assert drawn.get_color() == "#654321" and ax.get_xlabel() == "$v$"
     with pytest.raises(UnknownNameError):
         orbit.plot(ax=ax, x="w")
+
+
+def test_labels_keep_out_of_each_other_s_way():
+    """Two labels at almost the same point: boxes measured by matplotlib do not overlap, whatever the limits."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from stability.plots.labels import write_label
+
+    figure = Figure(figsize=(3, 2))
+    canvas = FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    labels = [write_label(axes, f"LP{k}", (0.5 + 1e-3 * k, 0.5), "k") for k in range(4)]
+    axes.set(xlim=(0, 1), ylim=(0.1, 10), yscale="log")
+    canvas.draw()
+    boxes = [label.get_window_extent() for label in labels]
+    assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    assert list(axes.texts) == labels
