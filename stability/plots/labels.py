@@ -12,7 +12,10 @@ from typing import Any, Literal
 
 __all__ = ["write_label"]
 
-_PLACES: tuple[tuple[int, int, Literal["left", "right"]], ...] = ((4, 4, "left"), (-4, 4, "right"), (4, -11, "left"), (-4, -11, "right"), (4, 14, "left"), (4, -21, "left"))
+Place = tuple[int, int, Literal["left", "right"]]
+_PLACES: tuple[Place, ...] = (
+    (4, 4, "left"), (-4, 4, "right"), (4, -11, "left"), (-4, -11, "right"), (4, 14, "left"), (4, -21, "left"),
+)  # fmt: skip
 _BELOW = (*_PLACES[2:4], *_PLACES[:2], *_PLACES[4:])
 
 
@@ -28,7 +31,7 @@ def _label_class() -> Any:
         def draw(self, renderer: Any) -> None:
             """Take a free place, then draw."""
             taken = []
-            for text in self.axes.texts:
+            for text in self.axes.texts if self.axes is not None else ():
                 if text is self:
                     break
                 if isinstance(text, Label) and text.get_visible():
