@@ -397,8 +397,8 @@ class Collocation(OrbitDiscretisation):
     def spectrum(self, linearisation: Any) -> Spectrum:
         """Multipliers, their error, counts, verdict.
 
-        The error is that by degree m + 1, the trivial multiplier's distance from 1, Liouville's gap and, where the orbit
-        passes a kink, twice the distance from multipliers by integration (`collocation_kinks`) together.
+        The error is that by degree m + 1, the trivial multiplier's distance from 1, Liouville's gap and, past kinks,
+        twice the distance from multipliers by integration (`collocation_kinks`) together.
         """
         M, error = linearisation.spectral, 0.0
         largest = float(np.abs(M).max())

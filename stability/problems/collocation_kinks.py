@@ -7,9 +7,10 @@ it. From the first node x_0, with the closure x(1) = S x(0) + w,
 
     (Phi - S) dx = S x_0 + w - phi(x_0)      (autonomous: + f(end) dsigma,  f(x_0) . dx = 0)
 
-is the error of x_0 to first order; parts along which the matrix is singular (a branch at its fold) are left out, as they
-only move the orbit along its branch. A second integration from x_0 + dx gives the orbit whose nodes and multipliers the
-errors are counted from. Twice the difference of the multipliers is their error (here of the multiplier itself, not over its modulus). Cost: two integrations a point.
+is the error of x_0 to first order; parts along which the matrix is singular (a branch at its fold) are left out, as
+they only move the orbit along its branch. A second integration from x_0 + dx gives the orbit whose nodes and
+multipliers the errors are counted from. Twice the largest difference of a multiplier, not over its modulus, is their
+error. Cost: two integrations a point.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ _LOST = Passage(np.full((1, 1), np.nan), None, math.inf)
 def kink_advice(system: object) -> str:
     """What to say of a problem that stops, where the equations have kinks; begins with a semicolon, or empty."""
     words = kink_words(system)
-    return f"; {words} in the equations makes kinks that polynomials in time do not follow: try Shooting" if words else ""
+    return f"; the equations have kinks ({words}) that polynomials in time do not follow: try Shooting" if words else ""
 
 
 def passage(problem: Collocation, u: Array, params: Array) -> Passage | None:

@@ -220,7 +220,7 @@ def warn_of_truncation(problem: HarmonicBalance, found: Correction, params: Arra
     few = "harmonic is" if problem.harmonics == 1 else "harmonics are"
     remedy = f"harmonics={problem.harmonics + more}, or adaptive=True"
     if problem.adaptive:
-        remedy = "a term with a kink converges slowly: Collocation is its method; or give harmonics= and a larger most="
+        remedy = "a term with a kink converges slowly: Shooting is its method; or give harmonics= and a larger most="
     warnings.warn(
         f"{problem.harmonics} {few} too few for '{problem.system.name}' at {where}: estimated error {found.error:.1e} "
         f"of the states' scales, wanted {problem.accuracy:.0e}; about {more} more are missing ({remedy})",

@@ -33,7 +33,6 @@ _ZERO = 1e-7  # a jump of a derivative below this part of the derivative's size 
 
 class _Guards(NamedTuple):
     values: Any  # (t, *states, *parameters) -> list of guards
-    count: int
     jumps: list[Any]  # per guard None (unknown), or (derivatives of the jump by order, gradient of the guard)
 
 
@@ -59,7 +58,7 @@ def _guards(system: Any) -> _Guards:
             [sp.lambdify(given, order, "numpy", cse=True) for order in orders],
             sp.lambdify(arguments, [guard, *gradient], "numpy"),
         ))  # fmt: skip
-    return _Guards(sp.lambdify(arguments, list(found.guards), "numpy"), len(found.guards), jumps)
+    return _Guards(sp.lambdify(arguments, list(found.guards), "numpy"), jumps)
 
 
 def _values(system: Any, times: Array, X: Array, params: Array) -> Array:
@@ -122,14 +121,14 @@ def smoothness(system: Any, times: Array, X: Array, params: Array) -> int:
     known, least = _guards(system), SMOOTH
     values, tiny = _values(system, times, X, params), _ON * float(np.abs(X).max(initial=1.0))
     signs = np.where(values >= 0, 1.0, -1.0)
-    for k in range(known.count):
+    for k, jump in enumerate(known.jumps):
         low, high = float(values[k].min()), float(values[k].max())
         if not (low <= tiny and high >= -tiny):
             continue
         stays = max(-low, high) <= tiny
         places = [0] if stays else np.flatnonzero(np.diff(signs[k])).tolist() or [int(np.argmin(np.abs(values[k])))]
         for i in places:
-            found = _order(known.jumps[k], times[i], X[i], params, signs[:, i])
+            found = _order(jump, times[i], X[i], params, signs[:, i])
             least = min(least, found - 1 if stays else found)
     return least
 

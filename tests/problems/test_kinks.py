@@ -11,6 +11,7 @@ import pytest
 import sympy as sp
 
 import stability as st
+from stability.errors import StabilityWarning
 from stability.problems.kinks import SMOOTH, passes_a_kink, smoothness, smoothness_along
 
 t = sp.Symbol("t", real=True)
@@ -66,6 +67,7 @@ def forced(term: sp.Expr) -> st.System:
     return st.System.from_equations(equation, [x], parameters=dict(w=1.0), period=2 * sp.pi)
 
 
+@pytest.mark.filterwarnings("ignore::stability.errors.StabilityWarning")
 @pytest.mark.parametrize(("power", "order"), [(1, 1), (2, 2), (3, 3)])
 def test_order_of_a_kink(power: int, order: int) -> None:
     """max(x - 1/4, 0)^r has r - 1 continuous derivatives, so that the r-th one jumps."""
@@ -80,3 +82,47 @@ def test_a_jump_is_of_order_zero_and_staying_on_a_kink_costs_one_order() -> None
     rest, moving = np.zeros((5, 2)), np.ones((5, 2))
     assert smoothness(drag, np.zeros(5), rest, drag.parameter_vector()) == 1
     assert smoothness(drag, np.zeros(5), moving, drag.parameter_vector()) == SMOOTH
+
+
+@pytest.fixture(scope="module")
+def soft_stop() -> st.Branch:
+    with pytest.warns(StabilityWarning, match=r"Max, Min, Piecewise.*Shooting") as seen:
+        branch = st.continuation(st.Collocation(st.models.soft_stop_oscillator()), "Omega", (1.8, 0.5))
+    assert sum("kinks" in str(w.message) for w in seen) == 1
+    return branch
+
+
+def test_stated_errors_of_collocation_hold_past_kinks(soft_stop: st.Branch) -> None:
+    """Witness: shooting from the same state, whose integration locates the kinks; at every point of the branch."""
+    passed = 0
+    for i, omega in enumerate(soft_stop.parameter):
+        orbit, system = soft_stop.solution(i), st.models.soft_stop_oscillator().with_params(Omega=omega)
+        if not passes_a_kink(system, orbit):
+            continue
+        passed += 1
+        exact, p = st.Shooting(system, rtol=1e-11), system.parameter_vector()
+        u = exact.correct(orbit(0.0), p, "Omega", None, 0.0, 1e-11).u
+        true = exact.spectrum(exact.linearise(u, p)).values
+        for mu in soft_stop.values[i][
+            np.abs(soft_stop.values[i]) > 0.3
+        ]:  # the error is that near and outside the circle
+            assert np.abs(true - mu).min() <= soft_stop.value_errors[i], omega
+        times = np.linspace(0.0, orbit.period, 400)
+        gap = np.abs(exact.view(u, p)(times) - orbit(times)).max(axis=1) / np.abs(orbit(times)).max(axis=1)
+        assert gap.max() <= soft_stop.error[i], omega
+    assert passed > 12
+
+
+def test_smooth_parts_keep_their_small_errors(soft_stop: st.Branch) -> None:
+    """Orbits that stay between the stops have nothing to fear from them."""
+    assert soft_stop.value_errors[0] < 1e-11 and soft_stop.error[0] < 1e-12
+
+
+@pytest.mark.filterwarnings("ignore::stability.errors.StabilityWarning")
+def test_a_branch_that_stops_names_the_kinks() -> None:
+    """A mesh too coarse for the passages: Newton's method fails, and the message says why and what to do."""
+    coarse = st.Collocation(bilinear(0.5), adaptive=False, degree=2, intervals=10)
+    branch = st.continuation(coarse, "w", (0.5, 3.0))
+    assert branch.status is st.Status.STEP_TOO_SMALL
+    assert "kinks (Max)" in branch.message and "Shooting" in branch.message
+    assert not coarse.doubt.startswith(" ") and st.Collocation(st.models.duffing()).doubt == ""
