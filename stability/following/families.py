@@ -6,11 +6,12 @@ branch has yet are looked for by deflated Newton iteration: with the known solut
     M(u) F(u) = 0,   M(u) = prod_k (1 + 1 / |u - u_k|^2),      step = tau step_Newton,  tau = 1 / (1 - M'(step)/M),
 
 (norm of the problem), which cannot go to a known one. Every solution found is followed to both sides, and belongs from
-then on to the known ones, and so do its images S x(t - sigma T) under the symmetries of the system. Harmonic
-balance of polynomial equations gives all solutions with one harmonic as guesses (problems/harmonic_roots); `through`
-another parameter, a forcing amplitude for example, known solutions are continued at those values, and every new
-crossing of the nominal value is a solution too. A search from finitely many guesses: what is found is there, what is
-not found may be.
+then on to the known ones, and so do its images S x(t - sigma T) under the symmetries of the system. Forced orbit
+problems bring guesses of their own, at these values and at both ends of the window (problems/orbit_candidates): all
+solutions with one harmonic of polynomial equations, the equilibria of the averaged field, what transients from there
+settle on. `through` another parameter, a forcing amplitude for example, known solutions are continued at those values,
+and every new crossing of the nominal value is a solution too. A search from finitely many guesses: what is found is
+there, what is not found may be.
 
 Reference: Farrell, Birkisson, Funke (2015), SIAM J. Sci. Comput. 37, A2026-A2045.
 """
@@ -64,7 +65,8 @@ def families(
         The continued parameter lambda.
     window : (from, to)
     places : int
-        Number of values of lambda, inside the window, at which more solutions are looked for.
+        Number of values of lambda, inside the window, at which more solutions are looked for; forced orbits also at
+        both ends, by the problem's own guesses alone. 0: no search at all.
     sizes : tuple of float
         Sizes of the guesses, relative to the largest known solution's states there.
     merge : bool
@@ -164,18 +166,28 @@ class _Search:
                 found.append(continuation(self.problem, self.name, ends, **options))
             except ConvergenceError as error:
                 trouble = error
-        searchable = not getattr(self.problem, "own", 0)
-        for k in range(places if searchable else 0):
-            value = first + (last - first) * (k + 0.5) / places
-            across = (self.across(value, found, *item, options) for item in through.items())
-            for solution in chain(self.solutions(value, found, sizes), *across):
+        for value, ends, factors in self.searched(first, last, places, sizes):
+            inside = value not in ends
+            across = (self.across(value, found, *item, options) for item in through.items()) if inside else ()
+            for solution in chain(self.solutions(value, found, factors), *across):
                 try:
-                    found.append(continuation(self.problem, self.name, (first, last), **{**options, "start": solution}))
+                    found.append(continuation(self.problem, self.name, ends, **{**options, "start": solution}))
                 except ConvergenceError as error:
                     trouble = error
         if not found:
             raise trouble or ConvergenceError("no solution was found anywhere in the window; give start=")
         return tuple(found)
+
+    def searched(
+        self, first: float, last: float, places: int, sizes: tuple[float, ...]
+    ) -> Iterator[tuple[float, tuple[float, float], tuple[float, ...]]]:
+        """(value, window, sizes of guesses): the places, and the ends by the problem's own candidates alone."""
+        if getattr(self.problem, "own", 0) or not places:
+            return
+        for k in range(places):
+            yield first + (last - first) * (k + 0.5) / places, (first, last), sizes
+        yield first, (first, last), ()
+        yield last, (last, first), ()
 
     def params_at(self, value: float) -> Array:
         params = np.array(list(self.problem.parameters.values()), dtype=float)

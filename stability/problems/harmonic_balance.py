@@ -45,7 +45,6 @@ _DENSE_DEGREE = 9
 _SETTLED = 1e-14  # multipliers belong to the point itself, not to the last iterate
 _NOTES = {NO_CONVERGENCE: "no convergence", SINGULAR: "singular", NEGATIVE_PERIOD: "the period became negative"}
 _MAX_HARMONICS, _MAX_SAMPLES = 1000, 65536
-_MOST_PATHS = 100  # of the homotopy to all one-harmonic solutions that a search may spend at a value
 _FIRST, _MOST = 7, 127  # harmonics to begin with where none are given; those that adaption goes to
 
 
@@ -351,12 +350,6 @@ class HarmonicBalance(OrbitDiscretisation):
         from .harmonic_switching import doubled_problem
 
         return doubled_problem(self, u, params)
-
-    def candidates(self, params: Array) -> list[Array]:
-        """Starts for `families`: all one-harmonic solutions of polynomial equations (see harmonic_roots)."""
-        from .harmonic_roots import one_harmonic_roots
-
-        return [c.ravel() for c in one_harmonic_roots(self, params, _MOST_PATHS)]
 
     def pieces(self, u: Array, params: Array) -> tuple[int, Array, Array, float]:
         """The series on 2H pieces, or more, as polynomials of degree 9."""

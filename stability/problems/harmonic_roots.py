@@ -109,6 +109,13 @@ def _balance(problem: HarmonicBalance, params: Array) -> Callable[[Array], tuple
     field, jacobian = _complex_field(problem.system)
     t = s * problem.orbit_period(params)
     places, velocities = layout.pairs
+    by_state, by_rate = ((back[:, None] * K.T).reshape(9, N) for K in (G, omega * D))  # (3 e + m, N)
+
+    def projected(kernel: Array, J: Array) -> Array:
+        """(K, e, r, m, j): the Jacobians (K, N, r, j) times series m of the state, projected on series e."""
+        r, j = J.shape[2:]
+        return (kernel @ J.reshape(len(J), N, r * j)).reshape(-1, 3, 3, r, j).transpose(0, 1, 3, 2, 4)
+
     power = np.where(layout.second, -(omega**2), 0.0) * np.array([0.0, 1.0, 1.0])[:, None]  # (3, q)
     first = np.where(layout.second, 0.0, omega)
 
@@ -122,10 +129,8 @@ def _balance(problem: HarmonicBalance, params: Array) -> Callable[[Array], tuple
         J = jacobian(states, t, params)[:, :, layout.rows]
         turned = np.stack([np.zeros_like(c[:, 0]), c[:, 2], -c[:, 1]], axis=1)
         R = power * c + first * turned - back @ F
-        by_x = np.einsum("en,knrj,nm->kermj", back, J[:, :, :, layout.unknowns], G, optimize=True)
-        by_v = np.einsum("en,knrj,nm->kermj", back, J[:, :, :, velocities], omega * D, optimize=True)
-        A = -by_x
-        A[:, :, :, :, places] -= by_v
+        A = -projected(by_state, J[:, :, :, layout.unknowns])
+        A[:, :, :, :, places] -= projected(by_rate, J[:, :, :, velocities])
         for r in range(q):
             for e in range(3):
                 A[:, e, r, e, r] += power[e, r]
@@ -227,6 +232,8 @@ def _followed(homotopy: Callable[[Array, Array], tuple[Array, Array, Array]], y:
             z = z - step
             change = np.abs(step).max(axis=1) / (1 + np.abs(z).max(axis=1))
             first = first if turn else change
+            if (change < 1e-11).all():
+                break
         good = np.isfinite(z).all(axis=1) & (change < 1e-11) & (first < 0.02)
         y[k[good]], t[k[good]] = z[good], new_t[good]
         h[k] = np.where(good, np.where(first < 0.004, 2 * h[k], h[k]), 0.4 * h[k])

@@ -19,6 +19,7 @@ from ..integration.compiled import CompiledField
 from ..protocols import Critical, Seed
 from ..results.solutions import PeriodicOrbit
 from ..words import Kind
+from .orbit_candidates import orbit_candidates
 from .orbit_measures import orbit_measures, orbit_view
 from .orbit_starts import discretised, started
 from .orbit_symmetry import mirrored, mirrored_problem
@@ -173,6 +174,10 @@ class OrbitDiscretisation:
     def discretise(self, times: Array, states: Array, period: float) -> Array:
         """u of a periodic function from equispaced samples states (n, K)."""
         return discretised(self, times, states, period)
+
+    def candidates(self, params: Array) -> list[Array]:
+        """Starts for `families` (see `orbit_candidates`)."""
+        return orbit_candidates(self, params)
 
     def measures(self, u: Array, params: Array) -> dict[str, float]:
         """Columns of a branch (see `orbit_measures`)."""
