@@ -126,3 +126,33 @@ def test_a_branch_that_stops_names_the_kinks() -> None:
     assert branch.status is st.Status.STEP_TOO_SMALL
     assert "kinks (Max)" in branch.message and "Shooting" in branch.message
     assert not coarse.doubt.startswith(" ") and st.Collocation(st.models.duffing()).doubt == ""
+
+
+def van_der_pol() -> st.System:
+    """x'' + (|x| - 1) x' / 2 + x = 0, a limit cycle of its own period."""
+    mu = sp.Symbol("mu", real=True)
+    return st.System.from_equations({x.diff(t, 2): -mu * (sp.Abs(x) - 1) * x.diff(t) - x}, [x], parameters=dict(mu=0.5))
+
+
+def two_sided() -> st.System:
+    """x'' + x'/10 + x + 8 max(x - 1, 0) + 8 min(x + 1, 0) = cos(t/2)."""
+    spring = x + 8 * (sp.Max(x - 1, 0) + sp.Min(x + 1, 0))
+    equation = {x.diff(t, 2): sp.cos(t / 2) - x.diff(t) / 10 - spring}
+    return st.System.from_equations(equation, [x], parameters=dict(unused=0.0), period=4 * sp.pi)
+
+
+@pytest.mark.filterwarnings("ignore::stability.errors.StabilityWarning")
+@pytest.mark.parametrize(
+    ("system", "symmetry"), [(van_der_pol(), None), (two_sided(), {"x": "-x"})], ids=["own", "half"]
+)
+def test_stated_errors_on_an_own_period_and_on_half_a_period(system: st.System, symmetry: object) -> None:
+    """Witness: shooting over the whole period."""
+    start = dict(x=2.0) if symmetry is None else None
+    problem, exact = st.Collocation(system, symmetry=symmetry), st.Shooting(system)
+    p = system.parameter_vector()
+    u, v = problem.start(p, start), exact.start(p, start)
+    found, true = problem.spectrum(problem.linearise(u, p)), exact.spectrum(exact.linearise(v, p))
+    values = found.values if symmetry is None else found.values**2
+    error = found.error if symmetry is None else found.error * 2 * np.abs(found.values).max()
+    for number in true.values[np.abs(true.values) > 0.1]:
+        assert 1e-8 < np.abs(values - number).min() < error
