@@ -114,7 +114,7 @@ def _balance(problem: HarmonicBalance, params: Array) -> Callable[[Array], tuple
     def projected(kernel: Array, J: Array) -> Array:
         """(K, e, r, m, j): the Jacobians (K, N, r, j) times series m of the state, projected on series e."""
         r, j = J.shape[2:]
-        return (kernel @ J.reshape(len(J), N, r * j)).reshape(-1, 3, 3, r, j).transpose(0, 1, 3, 2, 4)
+        return (kernel @ J.reshape(len(J), N, r * j)).reshape(len(J), 3, 3, r, j).transpose(0, 1, 3, 2, 4)
 
     power = np.where(layout.second, -(omega**2), 0.0) * np.array([0.0, 1.0, 1.0])[:, None]  # (3, q)
     first = np.where(layout.second, 0.0, omega)

@@ -1,6 +1,6 @@
 """`families` finds what a double well has: x'' + x'/4 - x + x^3 = F cos w t, by collocation and by shooting.
 
-Witnesses: harmonic balance, scipy's DOP853 from other states than any guess, and `basins`.
+Witnesses: harmonic balance, and scipy's DOP853 from other states than any guess.
 """
 
 import numpy as np
@@ -50,8 +50,8 @@ def test_the_orbits_inside_the_wells_are_found_along_the_forcing(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_both_attractors_of_the_basins_are_on_the_families_along_the_frequency(method):
-    """At F = 0.1, w = 1: as many stable orbits, images counted, as `basins` has attractors, and at the same states."""
+def test_both_attractors_are_on_the_families_along_the_frequency(method):
+    """At F = 0.1, w = 1: the stable orbits, images counted, are the two that a grid of states settles on."""
     found = st.families(method(well()), "w", (0.5, 2.0))
     plain = st.families(method(well()), "w", (0.5, 2.0), merge=False)
     stable, both = ([o for b in some for o in b.at(w=1.0) if o.verdict is st.Verdict.STABLE] for some in (found, plain))
