@@ -7,7 +7,8 @@ One Richardson step on the central difference D(h) = (f(z + h) - f(z - h)) / 2h 
 
 with h = eps^(1/5) max(|z|, 1). The middle term is O(h^3) where f is smooth and as large as the jump of the slope where
 a kink lies within h. For smooth functions the estimate is pessimistic by one to three digits. All displaced points of
-all directions go to the function in ONE call, state axis first: t (M,), x (n, M), each parameter a number or (M,).
+all directions go to the function in ONE call, state axis first: t (M,), x (n, M), each parameter a number or (M,). A
+function that fails for arrays of parameters is called once for each set of numbers among them.
 Second and third directional derivatives are polarised differences with the same Richardson step.
 
 The parameter derivative is taken at fixed phase: t = phase T(p + h). The complex step f' = Im f(z + ih)/h is offered
@@ -23,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import EquationError, InputError
+from ..errors import EquationError, InputError, NonFiniteError
 from ._evaluator import Evaluator
 from .expressions import differentiate
 
@@ -36,6 +37,14 @@ COMPLEX_STEP = 1e-30
 LATER = 0.7390851332151607  # a time that is no multiple of anything, to see whether an autonomous function looks at t
 
 
+def _hint(error: Exception) -> str:
+    """What to write instead, where a function seems to have been written for single points."""
+    text = str(error)
+    if "truth value of an array" in text or "only length-1 arrays" in text or "only 0-dimensional arrays" in text:
+        return " (x is (n,) or (n, N), t a number or (N,): write np.where for if, np.sin for math.sin)"
+    return ""
+
+
 class FunctionEvaluator(Evaluator):
     """Evaluator of a system around a Python function."""
 
@@ -45,6 +54,8 @@ class FunctionEvaluator(Evaluator):
         super().__init__(system)
         self.function = system.function
         self.complex_step = complex_step
+        self.name = system.name
+        self._numbers_only = False  # whether the function has turned out to refuse arrays of parameters
         self._breaks = tuple(system.breaks)
         self._period, self._period_slopes = None, None
         self._time_checked = self.forced
@@ -69,9 +80,30 @@ class FunctionEvaluator(Evaluator):
         return rates
 
     def _rates(self, time: Array, X: Array, P: Array) -> Array:
-        columns = P if P.ndim == 1 else np.ascontiguousarray(P.T)
+        if P.ndim == 1:
+            return self._called(time, X, tuple(P))
+        if not self._numbers_only:
+            try:
+                return self._called(time, X, tuple(np.ascontiguousarray(P.T)))
+            except NonFiniteError:  # it may be a function of parameters that are numbers: `if a < 0.5: ...`
+                pass
+        values, owner = np.unique(P, axis=0, return_inverse=True)
+        owner, rates = owner.ravel(), np.empty(X.shape, np.result_type(X, P))
+        for k, parameters in enumerate(values):
+            own = owner == k
+            rates[own] = self._called(time[own], X[own], tuple(parameters))
+        self._numbers_only = True
+        return rates
+
+    def _called(self, time: Array, X: Array, parameters: tuple[Any, ...]) -> Array:
+        """The function at points (M, n), each parameter a number or (M,); what it raises is named and kept."""
         state = np.ascontiguousarray(X.T)
-        rates = self.function(time, state, **dict(zip(self.parameters, columns, strict=True)))
+        try:
+            rates = self.function(time, state, **dict(zip(self.parameters, parameters, strict=True)))
+        except Exception as error:  # a user's function may raise anything
+            raise NonFiniteError(
+                f"the right-hand side of '{self.name}' raised {type(error).__name__}: {error}{_hint(error)}"
+            ) from error
         if isinstance(rates, (list, tuple)):  # rows of different shape (a constant beside arrays) broadcast
             rates = np.stack([np.broadcast_to(np.asarray(row), state.shape[1:]) for row in rates]) if rates else rates
         rates = np.asarray(rates)

@@ -23,7 +23,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, NonFiniteError
 
 __all__ = ["Evaluator"]
 
@@ -225,7 +225,8 @@ class Evaluator:
                 parameters = _view(P, N, m) if stride else _view(P, 1, m)[0]
                 self._run(which, _view(phase, N, 1)[:, 0] if phase else None, _view(X, N, n), parameters, (), outputs)
             except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - what is raised here must not enter C
-                self.callback_error = error
+                known = isinstance(error, NonFiniteError) and error.__cause__ is not None
+                self.callback_error = error.__cause__ if known else error
                 for output in outputs:
                     output[:] = np.nan
 

@@ -166,8 +166,11 @@ class Constructors:
     ) -> Self:
         """A system around a numpy-broadcasting Python function ``f(t, x, *, <parameters>)`` -> dx/dt.
 
-        ``x`` has the state axis first, (n,) or (n, N), and ``t`` is a scalar or (N,). The parameters and their
-        defaults are the function's keyword-only arguments. Derivatives come from differences with an error estimate.
+        ``x`` has the state axis first, (n,) or (n, N), and ``t`` is a scalar or (N,): write ``np.where`` for ``if``
+        and ``np.sin`` for ``math.sin``. The parameters and their defaults are the function's keyword-only arguments;
+        each is a number, or (N,) where points of different parameters are evaluated together (derivatives). A function
+        that raises for such arrays, as ``if a < 0.5`` does, is called again with numbers, once a set of parameters:
+        slower, with equal results. Derivatives come from differences with an error estimate.
         Such a system hashes by the identity of its function, and a result that holds one is view-only after loading.
 
         Parameters
@@ -193,6 +196,8 @@ class Constructors:
         ------
         InputError
             If the function's signature does not fit, or a parameter has no value.
+        NonFiniteError
+            Later, where the function raises something: it names that, and has it as its ``__cause__``.
 
         Examples
         --------
