@@ -42,6 +42,8 @@ class Ending(StrEnum):
     MAX_STEPS = "max steps"
     TOO_MANY_EVENTS = "too many events"
     SLIDING = "sliding on a switch"
+    FAILED = "failed right-hand side"
+    INTERRUPTED = "interrupted"
 
 
 class Happening(NamedTuple):

@@ -11,6 +11,7 @@ followed by a table of the stroboscopic map (simulation/strobe_tables.py), and s
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -19,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, check_names
+from ..errors import InputError, StabilityWarning, check_names
 from ..integration.engine import Engine, Precision
 from ..kernels import strobing
 from ..results.basins import Attractor, Basins
-from .strobe_tables import tabulated
+from .strobe_tables import StrobeTable, tabulated
 
 __all__ = ["basins"]
 
@@ -61,11 +62,17 @@ def basins(
     Returns
     -------
     Basins
+        After Ctrl-C, once attractors are known, with the cells so far; the others are undecided.
 
     Raises
     ------
     InputError, UnknownNameError
         Before any work: an autonomous system, one with stops or switches, unknown names, an empty grid.
+
+    Warns
+    -----
+    StabilityWarning
+        It was interrupted, or a Python right-hand side raised: the cells concerned count as escaped.
 
     Examples
     --------
@@ -80,16 +87,46 @@ def basins(
     rows = np.unique(np.linspace(0, ny - 1, min(ny, _COARSE)).astype(int))
     columns = np.unique(np.linspace(0, nx - 1, min(nx, _COARSE)).astype(int))
     run.learn(X.reshape(ny, nx, -1)[np.ix_(rows, columns)].reshape(-1, system.n))
-    labels = np.empty((ny, nx), np.int64)
+    labels = np.full((ny, nx), strobing.UNDECIDED, np.int64)
+    agreement = 1.0
+    try:
+        table = _labelled(run, X, labels, workers, progress)
+        agreement = 1.0 if table is None else _agreement(run, X, labels.ravel())
+    except KeyboardInterrupt:
+        done = 1.0 - float((labels == strobing.UNDECIDED).mean())
+        warnings.warn(
+            f"interrupted: {100 * done:.3g} % of the cells are labelled, the others undecided", StabilityWarning,
+            stacklevel=2,
+        )  # fmt: skip
+    failure = engine.compiled.evaluations.failure()
+    if failure:
+        warnings.warn(f"motions of '{system.name}' count as escaped where they fail{failure}", StabilityWarning, 2)
+    attractors = tuple(
+        Attractor(k, points, multiple, float((labels == k).mean())) for k, (points, multiple) in enumerate(run.found)
+    )
+    named = dict(zip(system.parameters, run.params.tolist()))
+    return Basins(
+        system.name, x[0], y[0], grids[0], grids[1], labels, attractors, tuple(system.states), named, agreement
+    )  # fmt: skip
+
+
+def _labelled(
+    run: _Follower, X: Array, labels: Array, workers: int | None, progress: Callable[[int, int], Any] | None
+) -> StrobeTable | None:
+    """Label all cells, in place, row after row; the table of the stroboscopic map that was used."""
+    ny, nx = labels.shape
     ends = X.reshape(ny, nx, -1).copy()
-    threads = 1 if engine.compiled.evaluations.backend != "llvm" else workers or cpu_count() or 1
+    threads = 1 if run.engine.compiled.evaluations.backend != "llvm" else workers or cpu_count() or 1
     with ThreadPoolExecutor(min(threads, ny)) as pool:
-        table = tabulated(run, X, pool, progress, ny)
-        label = run.assign if table is None else partial(table.assign, run)
-        before = 0 if table is None else table.rows
-        for k, _ in enumerate(pool.map(lambda row: label(ends[row], labels[row]), range(ny))):
-            if progress is not None:
-                progress(before + k + 1, before + ny)
+        try:
+            table = tabulated(run, X, pool, progress, ny)
+            label = run.assign if table is None else partial(table.assign, run)
+            before = 0 if table is None else table.rows
+            for k, _ in enumerate(pool.map(lambda row: label(ends[row], labels[row]), range(ny))):
+                if progress is not None:
+                    progress(before + k + 1, before + ny)
+        finally:
+            pool.shutdown(cancel_futures=True)
     for _ in range(_ROUNDS):  # attractors that the subset did not see
         left = labels == strobing.UNDECIDED
         before = len(run.found)
@@ -102,14 +139,7 @@ def basins(
         states, again = ends[left], np.empty(int(left.sum()), np.int64)
         run.assign(states, again)
         ends[left], labels[left] = states, again
-    attractors = tuple(
-        Attractor(k, points, multiple, float((labels == k).mean())) for k, (points, multiple) in enumerate(run.found)
-    )
-    named = dict(zip(system.parameters, run.params.tolist()))
-    agreement = 1.0 if table is None else _agreement(run, X, labels.ravel())
-    return Basins(
-        system.name, x[0], y[0], grids[0], grids[1], labels, attractors, tuple(system.states), named, agreement
-    )  # fmt: skip
+    return table
 
 
 def _agreement(run: _Follower, X: Array, labels: Array) -> float:

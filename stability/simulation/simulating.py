@@ -19,7 +19,7 @@ from typing import Any, overload
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, NonFiniteError
 from ..integration.engine import Engine, Motion, Precision
 from ..results.trajectory import Ending, Trajectory
 from .starts import batch, checked_span
@@ -114,6 +114,8 @@ def simulate(
     ------
     InputError, UnknownNameError
         Before any work.
+    NonFiniteError
+        The right-hand side is not finite at the start, or is a Python function that raises.
 
     Notes
     -----
@@ -139,6 +141,7 @@ def simulate(
     if method != "DOP853" and events:
         raise InputError("events need method='DOP853'")
     engine = Engine.of(system, events, (stop_at,) if isinstance(stop_at, str) else stop_at)
+    _check_start(engine, X, P, t0)
 
     def one(k: int) -> Trajectory:
         if method == "DOP853":
@@ -154,6 +157,21 @@ def simulate(
         return Ensemble(tuple(one(k) for k in range(count)))
     with ThreadPoolExecutor(threads) as pool:
         return Ensemble(tuple(pool.map(one, range(count))))
+
+
+def _check_start(engine: Engine, X: Array, P: Array, t0: float) -> None:
+    """Raise `NonFiniteError` where a motion cannot begin; what a Python function raises does so itself."""
+    rate = 1.0 / engine.compiled.evaluations.period(P) if engine.forced else 1.0
+    with np.errstate(all="ignore"):
+        rates = engine.compiled.evaluations.F(np.broadcast_to(t0 * rate, (len(X),)), X, P)
+    bad = np.argwhere(~np.isfinite(rates))
+    if bad.size:
+        k, i = bad[0]
+        start = ", ".join(f"{s} = {v:g}" for s, v in zip(engine.system.states, X[k]))
+        raise NonFiniteError(
+            f"the rate of {engine.system.states[i]} of '{engine.system.name}' is {rates[k, i]} at the start, "
+            f"t = {t0:g}, {start}: give x0= or parameters where it is finite"
+        )
 
 
 def as_trajectory(engine: Engine, motion: Motion, params: Array, rtol: float) -> Trajectory:

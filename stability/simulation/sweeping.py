@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, StabilityError, UnsettledWarning, check_names
+from ..errors import InputError, NonFiniteError, StabilityError, StabilityWarning, UnsettledWarning, check_names
 from ..integration.engine import Engine, Precision
 from ..results.sweep import Jump, Sweep
 from ..results.trajectory import Ending
@@ -72,15 +72,20 @@ def sweep(
     Returns
     -------
     Sweep
-        A sweep ends early, with its points so far, where the motion escapes: see ``status``.
+        A sweep ends early, with its points so far, where the motion escapes, a Python right-hand side raises, or
+        Ctrl-C is pressed: see ``status``.
 
     Raises
     ------
     InputError, UnknownNameError
         Before any work.
+    StabilityError
+        There is no first point to keep; what a right-hand side raised there is a NonFiniteError.
 
     Warns
     -----
+    StabilityWarning
+        The sweep was cut short by an error or Ctrl-C.
     UnsettledWarning
         Where more than 1 % of the transient is left in what was recorded.
 
@@ -97,19 +102,40 @@ def sweep(
     engine = Engine.of(system)
     values = plan.values()
     run = _Runner(engine, plan, precision)
-    if start == "carry":
-        dwells = _carried(run, values, plan.x0, progress)
-    else:
-        dwells = _from_rest(run, values, plan.x0, workers, progress)
-    last = dwells[-1].ending
-    if last is not Ending.COMPLETED:
-        dwells = dwells[:-1]
+    dwells: list[Dwell] = []
+    last = Ending.COMPLETED
+    jumps: tuple[Jump, ...] = ()
+    try:
+        if start == "carry":
+            _carried(run, values, plan.x0, progress, dwells)
+        else:
+            _from_rest(run, values, plan.x0, workers, progress, dwells)
+    except (NonFiniteError, KeyboardInterrupt) as error:
+        last = _cut_short(error, dwells, parameter, values)
+    if dwells[-1].ending is not Ending.COMPLETED:
+        last = dwells.pop().ending
     if not dwells:
         raise StabilityError(f"'{system.name}' escapes at the first value, {parameter} = {values[0]:g} ({last})")
     values = values[: len(dwells)]
-    result = _collected(run, values, dwells, last, _jumps(run, values, dwells))
+    try:
+        jumps = () if last is Ending.INTERRUPTED else _jumps(run, values, dwells)
+    except KeyboardInterrupt as error:
+        last = _cut_short(error, dwells, parameter, values)
+    result = _collected(run, values, dwells, last, jumps)
     _warn(result)
     return result
+
+
+def _cut_short(error: BaseException, dwells: list[Dwell], parameter: str, values: Array) -> Ending:
+    """What ends a sweep from outside, told by a warning; raised again where there is no point to keep."""
+    if not dwells:
+        raise error
+    interrupted = isinstance(error, KeyboardInterrupt)
+    here = values[min(len(dwells), len(values) - 1)]
+    where = f"after {len(dwells)} of {len(values)} points, at {parameter} = {here:g}"
+    why = "interrupted; jumps may be missing" if interrupted else str(error)
+    warnings.warn(f"the sweep ends {where}: {why}", StabilityWarning, stacklevel=3)
+    return Ending.INTERRUPTED if interrupted else Ending.FAILED
 
 
 @dataclass(frozen=True)
@@ -191,8 +217,8 @@ class _Runner:
         return dwell(self.engine, params, x0, period, plan.periods, plan.record, plan.harmonics, self.precision)
 
 
-def _carried(run: _Runner, values: Array, x: Array, progress: Any) -> list[Dwell]:
-    dwells = []
+def _carried(run: _Runner, values: Array, x: Array, progress: Any, dwells: list[Dwell]) -> None:
+    """Fill `dwells`, which the caller keeps whatever happens."""
     for k, value in enumerate(values):
         dwells.append(run(float(value), x))
         if dwells[-1].ending is not Ending.COMPLETED:
@@ -200,21 +226,23 @@ def _carried(run: _Runner, values: Array, x: Array, progress: Any) -> list[Dwell
         x = dwells[-1].end
         if progress is not None:
             progress(k + 1, len(values))
-    return dwells
 
 
-def _from_rest(run: _Runner, values: Array, x: Array, workers: int | None, progress: Any) -> list[Dwell]:
+def _from_rest(
+    run: _Runner, values: Array, x: Array, workers: int | None, progress: Any, dwells: list[Dwell]
+) -> None:  # fmt: skip
+    """Fill `dwells`, which the caller keeps whatever happens."""
     threads = 1 if run.engine.compiled.evaluations.backend != "llvm" else workers or cpu_count() or 1
-    dwells: list[Dwell] = []
     with ThreadPoolExecutor(max(1, min(threads, len(values)))) as pool:
-        for k, found in enumerate(pool.map(lambda value: run(float(value), x), values)):
-            dwells.append(found)
-            if found.ending is not Ending.COMPLETED:
-                pool.shutdown(cancel_futures=True)
-                break
-            if progress is not None:
-                progress(k + 1, len(values))
-    return dwells
+        try:
+            for k, found in enumerate(pool.map(lambda value: run(float(value), x), values)):
+                dwells.append(found)
+                if found.ending is not Ending.COMPLETED:
+                    break
+                if progress is not None:
+                    progress(k + 1, len(values))
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 # ---------------------------------------------------------------------- jumps
@@ -261,7 +289,10 @@ def _located(
             value = start + i * part
             if (value - last) * part > 0:
                 return None
-            found = run(value, before.end if carried else run.plan.x0)
+            try:
+                found = run(value, before.end if carried else run.plan.x0)
+            except NonFiniteError:  # a Python right-hand side that raises
+                return None
             if found.ending is not Ending.COMPLETED:
                 return None
             if distance(before, found) > _KEPT * size:
