@@ -123,7 +123,7 @@ def flow(
         raise InputError(f"span = ({t0:g}, {t1:g}): two ascending finite times are needed")
     scales = np.empty(n)
     scales[:] = atol
-    if not 1e-15 < rtol < 1 or not (scales > 0).all():
+    if not 1e-15 < rtol < 1 or not all(scale > 0 for scale in scales.tolist()):
         raise InputError(f"rtol = {rtol:g} must lie in (1e-15, 1), atol = {atol} must be positive")
     if system.stops or has_switches(system):
         return _over_events(system, (t0, t1), x, params, rtol, atol, variations, parameters, dense, max_steps)
@@ -132,7 +132,7 @@ def flow(
     z = np.zeros((n, 1 + len(which)))
     z[:, 0] = x
     if variations:
-        np.fill_diagonal(z[:, 1:], 1.0)
+        z.ravel()[1 :: z.shape[1] + 1] = 1.0  # the diagonal behind the state
     period, slopes, breaks = compiled.timing(params)
     rates = np.where(which >= 0, slopes[which], 0.0) if len(parameters) else np.zeros(len(which))
     address = compiled.address if len(parameters) else compiled.evaluations.address("FJ" if variations else "F")

@@ -18,8 +18,9 @@ import numpy as np
 
 from stability.errors import InputError
 from stability.kernels import dop853_coefficients as method
-from stability.kernels.addresses import call_field
+from stability.kernels.addresses import borrowed, call_field
 from stability.kernels.caching import kernel
+from stability.kernels.vectors import add_four, combine_four, set_four
 
 __all__ = ["DONE", "NOT_FINITE", "STEP_TOO_SMALL", "TOO_MANY_STEPS", "advance", "integrate", "interpolate"]
 
@@ -27,8 +28,8 @@ DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, NOT_FINITE, NO_ROOM = 0, 1, 2, 3, 4
 _NODES = method.C
 # rows behind the stages: the step, its two errors (the second: what it has beyond the step), the dense output. They are
 # entries of an array because an integer literal as an argument is a type of its own for numba, which compiles the
-# helper once more for it.
-_BEHIND, _FIRST = np.array([16, 17, 18, 19]), np.array([0, 1])
+# helper once more for it. Lines behind the slopes: state, end of step, its copy, zeros, two errors.
+_BEHIND, _FIRST, _LINES = np.array([16, 17, 18, 19]), np.array([0, 1]), np.arange(16, 22)
 
 
 def _quads() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -69,35 +70,44 @@ def _exchange(z, line, inward):  # type: ignore[no-untyped-def]
 
 @kernel(inline=True)
 def _combine(row, h, start, K, out):  # type: ignore[no-untyped-def]
-    """out = start + h sum_i w_i K_i with the weights of a row of the method."""
-    for e in range(out.shape[0]):
-        out[e] = start[e]
+    """out = start + h sum_i w_i K_i with the weights of a row of the method; out and start are numbers of rows of K."""
     for q in range(_QUADS[row]):
-        i, j, k, m = _PLACES[row, q, 0], _PLACES[row, q, 1], _PLACES[row, q, 2], _PLACES[row, q, 3]
+        rows = (_PLACES[row, q, 0], _PLACES[row, q, 1], _PLACES[row, q, 2], _PLACES[row, q, 3])
         a, b, c, d = _WEIGHTS[row, q, 0], _WEIGHTS[row, q, 1], _WEIGHTS[row, q, 2], _WEIGHTS[row, q, 3]
-        for e in range(out.shape[0]):
-            out[e] += h * ((a * K[i, e] + b * K[j, e]) + (c * K[k, e] + d * K[m, e]))
+        weights = (h * a, h * b, h * c, h * d)
+        for e in range(0, K.shape[1], 4):
+            combine_four(K, out, start if q == 0 else out, e, rows, weights)
 
 
 @kernel(inline=True)
-def _slope(field, P, sigma, phase, x, V, which, sigma_p, F, J, Fp, K, i):  # type: ignore[no-untyped-def]
-    """K_i = d(x, V)/ds at x (n,), V (n, k). An unsigned index cannot be negative: no wrapping, no gathered loads."""
+def _slope(field, P, sigma, phase, x, V, which, sigma_p, plain, F, J, Fp, K, i):  # type: ignore[no-untyped-def]
+    """K_i = d(x, V)/ds at x (n,), V (n, k); plain: no derivatives by parameters.
+
+    An unsigned index cannot be negative: no wrapping, no gathered loads. F is read last: the processor has written it.
+    """
     n, count = V.shape
     phase[0] -= math.floor(phase[0])
     call_field(field, 1, phase, x, P, 0, F, J, Fp)
-    for a in range(n):
-        K[i, a] = sigma * F[a]
-        at = n + a * count
-        for k in range(count):
-            K[i, np.uint64(at + k)] = sigma_p[k] * F[a]
-        for k in range(count):
-            if which[k] >= 0:
-                K[i, np.uint64(at + k)] += sigma * Fp[a, which[k]]
-        for b in range(n if count > 0 else 0):
+    for a in range(n if count > 0 else 0):
+        at, factor = n + a * count, sigma * J[a, 0]
+        if plain:
+            for k in range(0, count - 3, 4):
+                set_four(K, i, at + k, factor, V, 0, k)
+            for k in range(count - count % 4, count):
+                K[i, np.uint64(at + k)] = factor * V[0, k]
+        else:
+            for k in range(count):
+                slope = sigma_p[k] * F[a] + factor * V[0, k]
+                K[i, np.uint64(at + k)] = slope + sigma * Fp[a, which[k]] if which[k] >= 0 else slope
+        for b in range(1, n):
             factor = sigma * J[a, b]
             if factor != 0.0:
-                for k in range(count):
+                for k in range(0, count - 3, 4):
+                    add_four(K, i, at + k, factor, V, b, k)
+                for k in range(count - count % 4, count):
                     K[i, np.uint64(at + k)] += factor * V[b, k]
+    for a in range(n):
+        K[i, np.uint64(a)] = sigma * F[a]
 
 
 @kernel(inline=True)
@@ -120,21 +130,32 @@ def _scaled(square, other, count):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _variation_error(five, three, V, x, rtol, atol, P, which):  # type: ignore[no-untyped-def]
+def _variation_error(five, three, V, x, rtol, atol, weights, P, which):  # type: ignore[no-untyped-def]
     """Scaled error of the variations V (n, k) at x from their two estimates.
 
-    A variation is held to rtol of its own largest entry; a derivative by a parameter p need not be better than what a
-    relative change of p by one makes of the state's tolerance (where it is zero, its rounding is all there is).
+    A variation is held to rtol of its own largest entry, in units of atol (weights: 1 / atol); a derivative by a
+    parameter p need not be better than what a relative change of p by one makes of the state's tolerance (where it is
+    zero, its rounding is all there is).
     """
     n, count = V.shape
     square, other = 0.0, 0.0
     for k in range(count):
-        size, floor = 0.0, 0.0
+        size, first, second = 0.0, 0.0, 0.0
+        if which[k] < 0 or P[which[k]] == 0.0:
+            for a in range(n):
+                weight = weights[a]
+                value = abs(V[a, k]) * weight
+                size = value if value > size else size
+                first += (five[a, k] * weight) ** 2
+                second += (three[a, k] * weight) ** 2
+            scale = 1.0 / (rtol * size + 1e-300)
+            square += first * scale * scale
+            other += second * scale * scale
+            continue
         for a in range(n):
             value = abs(V[a, k]) / atol[a]
             size = value if value > size else size
-        if which[k] >= 0 and P[which[k]] != 0.0:
-            floor = 1.0 / abs(P[which[k]])
+        floor = 1.0 / abs(P[which[k]])
         for a in range(n):
             scale, least = floor * (atol[a] + rtol * abs(x[a])), rtol * atol[a] * size + 1e-300
             scale = scale if scale > least else least
@@ -171,19 +192,19 @@ def _euler_step(x, K, rtol, atol, span):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _end_of_step(h, line, K, zero, work, new, five, three, V, rtol, atol, P, which):  # type: ignore[no-untyped-def]
+def _end_of_step(h, line, K, zero, work, new, five, three, V, rtol, atol, weights, P, which):  # type: ignore[no-untyped-def]
     """Fill work and new with the end of the step (V are the variations in work); returns its scaled error."""
     n, size = V.shape[0], V.shape[0] * (1 + V.shape[1])
-    _combine(_BEHIND[0], h, zero, K, work)
-    _combine(_BEHIND[1], h, zero, K, five)
-    _combine(_BEHIND[2], h, work, K, three)
+    _combine(_BEHIND[0], h, _LINES[3], K, _LINES[1])
+    _combine(_BEHIND[1], h, _LINES[3], K, _LINES[4])
+    _combine(_BEHIND[2], h, _LINES[1], K, _LINES[5])
     for e in range(new.shape[0]):
         work[e] += line[e]
         new[e] = work[e]
     error = _state_error(five, three, line, new, rtol, atol)
     if V.shape[1] > 0:
         other = _variation_error(
-            five[n:size].reshape(V.shape), three[n:size].reshape(V.shape), V, new, rtol, atol, P, which
+            five[n:size].reshape(V.shape), three[n:size].reshape(V.shape), V, new, rtol, atol, weights, P, which
         )
         error = other if not other <= error else error
     return error
@@ -199,25 +220,49 @@ def advance(  # type: ignore[no-untyped-def]
     The field is never evaluated beyond low and high. dense = 1 keeps the steps from number `steps` on in times and
     coefficients, as `integrate` describes, and ends with NO_ROOM when these are full.
     """
-    n, count = z.shape[0], which.shape[0]
-    size = n * (1 + count)
+    n, m, size = z.shape[0], P.shape[0], z.size
     flat = (size + 7) // 8 * 8  # filled up with zeros: the processor takes eight at a time
-    K, lines, phase = np.zeros((16, flat)), np.zeros((6, flat)), np.empty(1)
+    rows, field_values = np.zeros((22, flat)), np.empty(1 + n + n * n + n * m + n)
+    found = _advance(
+        field, borrowed(P), sigma, phase0, rate, low, high, s, end, borrowed(z), borrowed(which), borrowed(sigma_p),
+        rtol, borrowed(atol), h, max_steps, dense, steps, borrowed(times), borrowed(coefficients), borrowed(rows),
+        borrowed(field_values),
+    )  # fmt: skip
+    rows[0, 0], field_values[0] = 0.0, 0.0  # their last use: they are kept until here
+    return found
+
+
+@kernel(inline=True)
+def _advance(  # type: ignore[no-untyped-def]
+    field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps, dense, steps, times,
+    coefficients, rows, field_values,
+):  # fmt: skip
+    """`advance` with arrays without owners; rows (22, flat) of zeros, field_values (1 + 2 n + n n + n m)."""
+    n, count = z.shape[0], which.shape[0]
+    size, flat, squared = n * (1 + count), rows.shape[1], 1 + n + n * n
+    K, lines, phase = rows, rows[16:], field_values[:1]
     line, work, new, zero, five, three = lines[0], lines[1], lines[2], lines[3], lines[4], lines[5]
-    F, J, Fp = np.empty(n), np.empty((n, n)), np.empty((n, P.shape[0]))
-    V = work[n:size].reshape((n, count))
+    F, J = field_values[1 : 1 + n], field_values[1 + n : squared].reshape((n, n))
+    Fp = field_values[squared : squared + n * P.shape[0]].reshape((n, P.shape[0]))
+    V, weights = work[n:size].reshape((n, count)), field_values[squared + n * P.shape[0] :]
+    for a in range(n):
+        weights[a] = 1.0 / atol[a]
+    by_parameter = 0
+    for k in range(count):
+        by_parameter += which[k] >= 0 or sigma_p[k] != 0.0
+    plain = by_parameter == 0
     _exchange(z, line, _FIRST[1])
     for e in range(flat):
         work[e] = line[e]
     rejected, status, last = False, TOO_MANY_STEPS, 16 if dense == 1 else 13
     phase[0] = phase0 + rate * _between(s, low, high)
-    _slope(field, P, sigma, phase, work, V, which, sigma_p, F, J, Fp, K, _FIRST[0])
+    _slope(field, P, sigma, phase, work, V, which, sigma_p, plain, F, J, Fp, K, _FIRST[0])
     if h <= 0.0:
         h = _euler_step(line, K, rtol, atol, end - s)
         for e in range(flat):
             work[e] = line[e] + h * K[0, e]
         phase[0] += rate * h
-        _slope(field, P, sigma, phase, work, V, which, sigma_p, F, J, Fp, K, _FIRST[1])
+        _slope(field, P, sigma, phase, work, V, which, sigma_p, plain, F, J, Fp, K, _FIRST[1])
         h = _between(_first_step(line, K, h, rtol, atol), 0.0, 0.1 * (end - s))
     for _ in range(max_steps):
         if dense == 1 and steps == coefficients.shape[0]:
@@ -228,14 +273,14 @@ def advance(  # type: ignore[no-untyped-def]
         error = 0.0
         for i in range(1, last):  # stage 12 is the slope at the end of the step, known to be good before it is taken
             if i != 12:
-                _combine(i, h, line, K, work)
+                _combine(i, h, _LINES[0], K, _LINES[1])
             else:
-                error = _end_of_step(h, line, K, zero, work, new, five, three, V, rtol, atol, P, which)
+                error = _end_of_step(h, line, K, zero, work, new, five, three, V, rtol, atol, weights, P, which)
                 if not error < 1.0:
                     break
             phase[0] = phase0 + rate * _between(s + _NODES[i] * h, low, high)
-            _slope(field, P, sigma, phase, work, V, which, sigma_p, F, J, Fp, K, i)
-        factor = 0.9 * error ** (-0.125) if error > 0.0 else 6.0
+            _slope(field, P, sigma, phase, work, V, which, sigma_p, plain, F, J, Fp, K, i)
+        factor = 0.9 / math.sqrt(math.sqrt(math.sqrt(error))) if error > 0.0 else 6.0
         if not error < 1.0:
             h *= _between(factor if error < np.inf else 0.1, 0.1, 1.0)
             rejected = True
@@ -271,7 +316,7 @@ def _keep(h, z, new, K, zero, work, coefficients, q):  # type: ignore[no-untyped
         coefficients[q, 2, a] = h * K[0, a] - change
         coefficients[q, 3, a] = 2.0 * change - h * (K[12, a] + K[0, a])
     for r in range(4):
-        _combine(_BEHIND[3] + r, h, zero, K, work)
+        _combine(_BEHIND[3] + r, h, _LINES[3], K, _LINES[4])
         for a in range(coefficients.shape[2]):
             coefficients[q, 4 + r, a] = work[a]
 

@@ -183,7 +183,8 @@ class System(Constructors):
         check_names("parameter", overrides, self.parameters)
         for key, value in overrides.items():
             self._check_value(key, value)
-        return np.array([float(overrides.get(k, v)) for k, v in self.parameters.items()])
+        values = {**self.parameters, **overrides} if overrides else self.parameters
+        return np.array(list(values.values()), float)
 
     def state_vector(self, x0: Mapping[str, float] | npt.ArrayLike | None = None) -> Array:
         """State (n,) from a mapping of names (missing ones zero), an array in state order, or None (all zero)."""
@@ -197,7 +198,7 @@ class System(Constructors):
             if out.shape != (self.n,):
                 listing = ", ".join(self.states)
                 raise InputError(f"a state of '{self.name}' has shape ({self.n},): {listing}; got {out.shape}")
-        if not np.isfinite(out).all():
+        if not all(map(math.isfinite, out.tolist())):
             raise InputError(f"the state {dict(zip(self.states, out.tolist()))} is not finite")
         return out
 
