@@ -53,8 +53,10 @@ def exact_folds(Omega: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     coupled = EPSILON - D / Omega**2
     A, B = D + 1j * Omega * L2 * coupled, 0.75 * KAPPA * coupled
     mixed, aa, bb = (A * np.conj(B)).real, abs(A) ** 2, abs(B) ** 2
+    inside = 4 * mixed**2 - 3 * aa * bb
+    inside = np.where(abs(inside) < 1e-10 * aa * bb, 0.0, inside)  # at a cusp it is rounding
     with np.errstate(invalid="ignore"):
-        root = np.sqrt(4 * mixed**2 - 3 * aa * bb)
+        root = np.sqrt(inside)
         z = [(-2 * mixed + sign * root) / (3 * bb) for sign in (1, -1)]
         lower, upper = (np.sqrt(aa * s + 2 * mixed * s**2 + bb * s**3) / EPSILON for s in z)
     return lower, upper
