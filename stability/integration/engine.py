@@ -169,7 +169,7 @@ class Engine:
         error = self.compiled.evaluations.callback_error
         if status == runge_kutta.NOT_FINITE and error is not None:
             why = self.compiled.evaluations.failure()
-            raise NonFiniteError(f"the motion of '{self.system.name}' ends at t = {t:.6g}{why}") from error
+            raise NonFiniteError(f"the motion of '{self.system.name}' failed at t = {t:.6g}{why}") from error
         if status == runge_kutta.TOO_MANY_STEPS:
             return Ending.MAX_STEPS
         if status == runge_kutta.STEP_TOO_SMALL and np.abs(x).max() < _ESCAPED * max(1e-3, float(np.abs(x0).max())):
