@@ -213,7 +213,7 @@ def root(time, state, *, a=0.0):
 def test_equilibria_up_to_where_the_right_hand_side_ends() -> None:
     system = st.System.from_function(root, states="x")
     branch = st.continuation(st.Equilibrium(system), "a", (2.0, -1.0), start=[1.4])
-    assert branch.status is st.Status.STEP_TOO_SMALL and branch.message == "ZeroDivisionError: no root left"
+    assert branch.status is st.Status.STEP_TOO_SMALL and branch.message == "NonFiniteError: the right-hand side of 'root' raised ZeroDivisionError: no root left"
     assert branch.labels == ("LP1",) and branch.columns["x"].min() == pytest.approx(-1.0, abs=1e-3)
 
 
