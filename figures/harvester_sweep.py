@@ -99,7 +99,8 @@ def draw(data: dict[str, Any], path: Path) -> None:
         f = point.params["frequency"]
         axes[0].annotate(f"{f:.2f} Hz", (f, 1e3 * point.solution.max["y"]), xytext=(5, 4), textcoords="offset points",
                          fontsize="small")
-    axes[0].legend(frameon=False, fontsize="small", loc="center right", handlelength=1.1, handletextpad=0.5)
+    axes[1].legend(frameon=False, fontsize="small", loc="center right", bbox_to_anchor=(1, 0.36), handlelength=1.1,
+                   handletextpad=0.5)
     _figure.letter(axes[0], "(a) response at 0.5 g")
     _figure.letter(axes[1], "(b) power")
     _figure.save(figure, path)

@@ -92,9 +92,12 @@ def plot_sweep(
         open_look = {**look, "markerfacecolor": "white", "label": None}
         artists += ax.plot(sweep.parameter[~settled], values[~settled], **open_look)
     if jumps and measure in ("max", "min", "pp"):
-        for jump in sweep.jumps:
+        direction = 1 if upward else -1
+        for k, jump in enumerate(sweep.jumps):
             before, after = (factor * _of(side[name], measure) for side in (jump.before, jump.after))
-            beyond = settled & ((sweep.parameter - jump.bracket[1]) * (1 if upward else -1) >= 0)
+            beyond = settled & ((sweep.parameter - jump.bracket[1]) * direction >= 0)
+            if k + 1 < len(sweep.jumps):  # and behind the next one it is another motion
+                beyond &= (sweep.parameter - sweep.jumps[k + 1].bracket[0]) * direction <= 0
             if beyond.any():  # right behind the jump the motion is still on its way
                 after = values[int(np.argmax(beyond))]
             artists += ax.plot([jump.parameter] * 2, [before, after], ":", color=color, linewidth=1.0)

@@ -176,7 +176,8 @@ def test_limit_cycle_of_the_normal_form() -> None:
 
 def test_conservative_orbit_has_a_double_multiplier() -> None:
     """x'' + x + x^3 = 0, x = A cn(w t, m): exact orbit; both multipliers are 1 in a Jordan block; neutral."""
-    special = pytest.importorskip("scipy.special")
+    from scipy import special
+
     x = sp.Function("x")(t)
     system = st.System.from_equations({x.diff(t, 2): -x - x**3}, coordinates=[x])
     amplitude = 1.3
@@ -198,7 +199,8 @@ def test_conservative_orbit_has_a_double_multiplier() -> None:
 
 def test_orbit_of_integrated_van_der_pol() -> None:
     """An orbit by numerical integration: trivial multiplier 1, the other inside; Liouville."""
-    integrate = pytest.importorskip("scipy.integrate")
+    from scipy import integrate
+
     system = st.models.van_der_pol()
 
     def flow(span, start, **options):
