@@ -18,21 +18,39 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Callable
-from typing import Any
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import OpenResonanceWarning
+from ..problems.collocation import Collocation
+from ..problems.orbit_measures import fundamental
 from ..results.branch import Branch
 from ..words import Status
 
 __all__ = ["warn_if_open"]
 
 Array = NDArray[np.float64]
-Balance = Callable[[float, float], tuple[float, float, float]]
 _DECADES, _STEPS = 4.0, 16
 _ANGLES, _PHASES = 48, 8
+_THIRD, _QUARTER = 3, 4  # every third angle and every fourth phase are enough to come near the backbone
+_SETTLED, _MOST = 1e-6, 0.5  # change of log(parameter) that ends an iteration; the largest that is made at once
+_BUMP = 1e-6
+
+
+class Balance(NamedTuple):
+    """The forces of the module's head for many motions at once: amplitudes (K,) at parameter values (K,).
+
+    resisting(a, values, few) : detuning and damping force, each (K,); `few` = by few samples.
+    exciting(values) : exciting force (K,).
+    begun(a, value) : values (K,) near the backbone if stiffness depends on the amplitude alone; None: not known.
+    """
+
+    resisting: Callable[[Array, Array, bool], tuple[Array, Array]]
+    exciting: Callable[[Array], Array]
+    begun: Callable[[Array, float], Array] | None = None
 
 
 def warn_if_open(branch: Branch, stacklevel: int = 3) -> None:
@@ -72,44 +90,92 @@ def _balance(branch: Branch, end: int) -> tuple[Balance, float, float] | None:
         return None
     if branch.name not in {s.name for s in getattr(system.period_expression, "free_symbols", ())}:
         return None
-    amplitude = problem.measures(branch.unknowns[end], params)[f"{system.coordinates[0]}.amplitude(1)"]
-    return _of_oscillator(problem, params, index), float(amplitude), value
+    return _of_oscillator(problem, params, index), _amplitude(problem, branch.unknowns[end], params), value
+
+
+def _amplitude(problem: Any, u: Array, params: Array) -> float:
+    """Of the fundamental harmonic of the one coordinate."""
+    if isinstance(problem, Collocation) and not problem.halved:
+        return fundamental(problem, u)[problem.system.states.index(problem.system.coordinates[0])]
+    return float(problem.measures(u, params)[f"{problem.system.coordinates[0]}.amplitude(1)"])
+
+
+@lru_cache(maxsize=2)
+def _samples(few: bool) -> tuple[Array, Array, Array]:
+    """Angles of the motion and phases of the forcing, cos and sin of all pairs: (phase, (2, N) cos sin, (N, 2) means).
+
+    The angles are mirrored at 0 and pi, where dry friction jumps. The means are -2 <f cos>, 2 <f sin>.
+    """
+    theta = 2 * np.pi * (np.arange(_ANGLES) + 0.5) / _ANGLES
+    turns = np.arange(_PHASES) / _PHASES
+    if few:
+        theta, turns = theta[_THIRD // 2 :: _THIRD], turns[::_QUARTER]
+    angle, phase = (g.ravel() for g in np.meshgrid(theta, turns, indexing="ij"))
+    waves = np.array([np.cos(angle), np.sin(angle)])
+    return phase, waves, waves.T * np.array([-2.0, 2.0]) / angle.size
+
+
+def _at_values(params: Array, index: int, values: Array) -> Array:
+    """(K, m): the parameters with another one of them."""
+    p = np.repeat(params[None], len(values), axis=0)
+    p[:, index] = values
+    return p
 
 
 def _of_oscillator(problem: Any, params: Array, index: int) -> Balance:
     """The head of this module, by samples of f over the angle of the motion and the phase of the forcing."""
     system, evaluations = problem.system, problem.evaluations
     place = system.states.index(system.coordinates[0])
-    theta = 2 * np.pi * (np.arange(_ANGLES) + 0.5) / _ANGLES  # mirrored at 0 and pi, where dry friction jumps
-    angle, phase = (g.ravel() for g in np.meshgrid(theta, np.arange(_PHASES) / _PHASES, indexing="ij"))
-    rest, turns = np.zeros((_ANGLES, 2)), np.arange(_ANGLES) / _ANGLES
+    turns = np.arange(_ANGLES) / _ANGLES
+    fundamental_of = 2 * np.exp(-2j * np.pi * turns) / _ANGLES
 
-    def balance(a: float, value: float) -> tuple[float, float, float]:
-        p = params.copy()
-        p[index] = value
-        w = 2 * np.pi / float(evaluations.period(p))
-        states = np.empty((angle.size, 2))
-        states[:, place], states[:, 1 - place] = a * np.cos(angle), -a * w * np.sin(angle)
-        f = evaluations.F(phase, states, p)[:, 1 - place].reshape(_ANGLES, _PHASES).mean(axis=1)
-        exciting = evaluations.F(turns, rest, p)[:, 1 - place]
-        k, damping = -2 * float(np.mean(f * np.cos(theta))) / a, 2 * float(np.mean(f * np.sin(theta)))
-        return w * w - k, damping, 2 * abs(complex(np.mean(exciting * np.exp(-2j * np.pi * turns))))
+    def field(phase: Array, states: Array, p: Array) -> Array:
+        """(K, N): the acceleration at N samples for each of K parameter vectors."""
+        count, size = len(p), len(phase)
+        every = np.repeat(p, size, axis=0)
+        f = evaluations.F(np.tile(phase, count), states, every)
+        return np.asarray(f[:, 1 - place]).reshape(count, size)
 
-    return balance
+    def resisting(a: Array, values: Array, few: bool) -> tuple[Array, Array]:
+        p = _at_values(params, index, values)
+        w = 2 * np.pi / evaluations.period(p)
+        phase, (cosine, sine), means = _samples(few)
+        states = np.empty((len(a), len(phase), 2))
+        np.multiply(a[:, None], cosine, out=states[:, :, place])
+        np.multiply((-a * w)[:, None], sine, out=states[:, :, 1 - place])
+        k, damping = (field(phase, states.reshape(-1, 2), p) @ means).T
+        return w * w - k / a, damping
+
+    def exciting(values: Array) -> Array:
+        p = _at_values(params, index, values)
+        return np.abs(field(turns, np.zeros((len(p) * _ANGLES, 2)), p) @ fundamental_of)
+
+    def begun(a: Array, value: float) -> Array:
+        square = (2 * np.pi / float(evaluations.period(_at_values(params, index, np.array([value]))[0]))) ** 2
+        detuning, _ = resisting(a, np.full(len(a), value), True)
+        return value * np.sqrt((square - detuning) / square)
+
+    return Balance(resisting, exciting, begun)
 
 
 def _of_slow_flow(problem: Any, params: Array, index: int) -> Balance:
     """The same of a slow flow z': z' at rest is the excitation, what z = (a, 0) adds is damping and detuning."""
-    states = np.zeros((2, 2))
 
-    def balance(a: float, value: float) -> tuple[float, float, float]:
-        p = params.copy()
-        p[index] = value
-        states[1, 0] = a
-        rest, moved = problem.evaluations.F(np.zeros(2), states, p)
-        return float(moved[1] - rest[1]) / a, float(rest[0] - moved[0]), float(np.hypot(*rest))
+    def resisting(a: Array, values: Array, few: bool) -> tuple[Array, Array]:
+        count = len(a)
+        states = np.zeros((2 * count, 2))
+        states[count:, 0] = a
+        both = _at_values(params, index, np.concatenate([values, values]))
+        z = problem.evaluations.F(np.zeros(2 * count), states, both)
+        rest, moved = z[:count], z[count:]
+        return (moved[:, 1] - rest[:, 1]) / a, rest[:, 0] - moved[:, 0]
 
-    return balance
+    def exciting(values: Array) -> Array:
+        count = len(values)
+        rest = problem.evaluations.F(np.zeros(count), np.zeros((count, 2)), _at_values(params, index, values))
+        return np.hypot(rest[:, 0], rest[:, 1])
+
+    return Balance(resisting, exciting)
 
 
 def _share(balance: Balance, amplitude: float, value: float) -> float:
@@ -117,33 +183,72 @@ def _share(balance: Balance, amplitude: float, value: float) -> float:
     if not amplitude > 0 or value == 0:
         return math.inf
     with np.errstate(all="ignore"):
-        linear, here = balance(1e-6 * amplitude, value)[0], balance(amplitude, value)[0]
-        if not abs(here) < 0.5 * abs(linear):
+        detuning, _ = balance.resisting(amplitude * np.array([1e-6, 1.0]), np.array([value, value]), False)
+        if not abs(detuning[1]) < 0.5 * abs(detuning[0]):
             return math.inf
-        growth, share = 1.0, math.inf
-        for k in range(_STEPS + 1):
-            a = amplitude * 10 ** (_DECADES * k / _STEPS)
-            found = _on_backbone(balance, a, value * growth)
-            if found is None:
-                return math.inf
-            growth, value = (found / value if k else 1.0), found
-            _, damping, exciting = balance(a, value)
-            if not damping < exciting:
-                return math.inf
-            share = damping / exciting
+        a = amplitude * 10 ** (_DECADES * np.arange(_STEPS + 1) / _STEPS)
+        shares = _at_once(balance, a, value)
+        if shares is None:
+            return _in_turn(balance, a, value)
+        return float(shares[-1]) if (shares < 1).all() else math.inf
+
+
+def _in_turn(balance: Balance, amplitudes: Array, value: float) -> float:
+    """The last D/F along the backbone, each point from the two before; infinity where it ends or one is not below 1."""
+    growth, share = 1.0, math.inf
+    for k, a in enumerate(amplitudes):
+        found = _on_backbone(balance, float(a), value * growth)
+        if found is None:
+            return math.inf
+        x, damping = found
+        growth, value = (x / value if k else 1.0), x
+        share = float(damping / balance.exciting(np.array([value]))[0])
+        if not share < 1:
+            return math.inf
     return share
 
 
-def _on_backbone(balance: Balance, a: float, guess: float) -> float | None:
-    """The parameter at which the detuning is zero, by Newton's method on its logarithm; None where there is none."""
+def _at_once(balance: Balance, a: Array, value: float) -> Array | None:
+    """D/F (K,) where `_in_turn` takes them, for all amplitudes at the same time; None where that is not sure.
+
+    Newton's method on few samples, then on all with the slopes found. It is the same curve if each value is where the
+    two before lead, as near as one step of Newton's method.
+    """
+    if balance.begun is None:
+        return None
+    x, slope, damping = balance.begun(a, value), np.ones(len(a)), a
+    for few in (True, False):
+        for _ in range(8):
+            if few:
+                gap, bumped = np.split(
+                    balance.resisting(np.tile(a, 2), np.concatenate([x, x * (1 + _BUMP)]), True)[0], 2
+                )
+                slope = (bumped - gap) / _BUMP
+            else:
+                gap, damping = balance.resisting(a, x, False)
+            change = -gap / slope
+            size = float(np.abs(change).max())
+            if not size < math.inf:
+                return None
+            x = x * np.exp(np.clip(change, -_MOST, _MOST))
+            if size < _SETTLED:
+                break
+        else:
+            return None
+    steps = np.diff(np.log(x))
+    return damping / balance.exciting(x) if (np.abs(np.diff(steps)) < _MOST).all() else None
+
+
+def _on_backbone(balance: Balance, a: float, guess: float) -> tuple[float, float] | None:
+    """(parameter at which the detuning is zero, damping force), by Newton's method on its logarithm; None: nowhere."""
     x = guess
     for _ in range(40):
-        gap, step = balance(a, x)[0], 1e-6
-        slope = (balance(a, x * (1 + step))[0] - gap) / step
+        (gap, bumped), (damping, _) = balance.resisting(np.array([a, a]), np.array([x, x * (1 + _BUMP)]), False)
+        slope = (bumped - gap) / _BUMP
         if not (math.isfinite(gap) and math.isfinite(slope)) or slope == 0:
             return None
-        change = max(-0.5, min(0.5, -gap / slope))
+        change = max(-_MOST, min(_MOST, -gap / slope))
         x *= math.exp(change)
-        if abs(change) < 1e-6:
-            return x
+        if abs(change) < _SETTLED:
+            return float(x), float(damping)
     return None

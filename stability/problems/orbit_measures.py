@@ -19,9 +19,10 @@ from ..kernels.gauss import gauss_rule
 from ..results.solutions import PeriodicOrbit
 
 if TYPE_CHECKING:
+    from .collocation import Collocation
     from .orbits import OrbitDiscretisation
 
-__all__ = ["orbit_measures", "orbit_view"]
+__all__ = ["fundamental", "orbit_measures", "orbit_view"]
 
 Array = np.ndarray
 
@@ -64,6 +65,18 @@ def orbit_measures(problem: OrbitDiscretisation, u: Array, params: Array) -> dic
             out[f"{name}.max"], out[f"{name}.min"] = float(column.max()), float(column.min())
             out[f"{name}.mean"] = float(weights @ column)
     return out
+
+
+def fundamental(problem: Collocation, u: Array) -> Array:
+    """(n,) 2 |c_1| of the states by the stages of a collocation mesh: within its error what `orbit_measures` gives.
+
+    For orbits solved on their whole period; angles may turn.
+    """
+    mesh = problem.mesh
+    points, stages = mesh.points.ravel(), mesh.split(u)[1].reshape(-1, mesh.n)
+    swing = stages - points[:, None] * problem.whole_winding
+    waves = mesh.weights * np.exp(-2j * np.pi * problem.forcing_periods * points)
+    return np.asarray(2 * np.abs(waves @ swing))
 
 
 def orbit_view(problem: OrbitDiscretisation, u: Array, params: Array) -> PeriodicOrbit:

@@ -2,11 +2,13 @@
 
 import warnings
 
+import numpy as np
 import pytest
 import sympy as sp
 
 import stability as st
 from stability.errors import OpenResonanceWarning
+from stability.following import open_resonance
 
 XI = 0.02
 LIMIT = 16 * XI**2 / 3
@@ -82,3 +84,41 @@ def test_physical_units():
             mass=m, stiffness=k1, cubic=k3, damping=2 * XI * (k1 * m) ** 0.5, amplitude=amplitude
         )
         assert len(warned(st.Collocation(system), "frequency", (5, 60))) == number
+
+
+def test_all_amplitudes_at_once_as_one_after_the_other():
+    """The share by Newton's method at all amplitudes together is that of the walk from one to the next: 300 systems."""
+    t = sp.Symbol("t", real=True)
+    names = "Omega xi beta eta drag rub tune lift"
+    w, xi, beta, eta, drag, rub, tune, lift = sp.symbols(names, real=True)
+    q = sp.Function("q")(t)
+    v = q.diff(t)
+    force = w**2 * sp.cos(w * t) * (1 + lift * q) - 2 * xi * w**tune * v - q - beta * q**3 - eta * q**5
+    system = st.System.from_equations(
+        {q.diff(t, 2): force - drag * v * sp.Abs(v) - rub * sp.sign(v)}, [q],
+        parameters=dict(zip(names.split(), (1.0,) * 8)), period=2 * sp.pi / w,
+    )  # fmt: skip
+    problem, random = st.Collocation(system), np.random.default_rng(3)
+    open_ones = 0
+    for _ in range(300):
+        p = system.parameter_vector(
+            Omega=1.0, xi=random.uniform(0.001, 0.05), beta=10 ** random.uniform(-4, 0), tune=random.integers(0, 2),
+            eta=random.choice([0.0, 1e-4]), drag=random.choice([0.0, 1e-3]), rub=random.choice([0.0, 0.01]),
+            lift=random.choice([0.0, 0.3]),
+        )  # fmt: skip
+        balance, amplitude = open_resonance._of_oscillator(problem, p, 0), random.uniform(3.0, 30.0)
+        value = (1 + 0.75 * p[2] * amplitude**2) ** 0.5
+        once = open_resonance._share(balance, amplitude, value)
+        turns = open_resonance._share(balance._replace(begun=None), amplitude, value)
+        assert once == turns or abs(once - turns) < 1e-6 * abs(turns)
+        open_ones += once < 1
+    assert 30 < open_ones < 270
+
+
+def test_the_amplitude_at_an_end_is_that_of_the_measures():
+    """2 |c_1| by the stages of the mesh, beside the polynomials of twice the degree that `measures` uses."""
+    branch = st.continuation(st.Collocation(st.models.duffing(xi=XI, beta=0.001)), "Omega", (0.9, 1.1))
+    for i in range(len(branch)):
+        problem, u, p = branch._problem(i), branch.unknowns[i], branch._vector(i)
+        expected = problem.measures(u, p)["u.amplitude(1)"]
+        assert abs(open_resonance._amplitude(problem, u, p) - expected) < 1e-8 * expected
