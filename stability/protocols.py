@@ -36,7 +36,7 @@ Vectors w, v may be complex; all products are bilinear (transpose, never conjuga
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -52,6 +52,9 @@ __all__ = [
     "Problem",
     "Seed",
     "Spectrum",
+    "Stretch",
+    "Stride",
+    "StridingProblem",
     "Tangent",
 ]
 
@@ -84,6 +87,42 @@ class Corrected(NamedTuple):
     linearisation: Linearisation | None  # at the last Newton iterate (within the tolerance of u): costs nothing
     converged: bool
     note: str = ""  # why not: "no convergence", "singular", "not finite: state x at phase 0.3"
+
+
+class Stretch(NamedTuple):
+    """What the driver asks of a problem that can take several steps in one call (`StridingProblem`).
+
+    The last point (u, params, values of its spectrum), its tangent and those before it (latest first, on the same mesh)
+    with the lengths of the steps that led to them; `length` of the first step to try, at most `most` steps, each inside
+    the `window` of the parameter. `limits` (angle, chord, miss, motion) and `pace` (longest step, far, few,
+    approach, creep) are the driver's constants.
+    """
+
+    u: Array
+    params: Array
+    free: str
+    values: NDArray[np.complex128]
+    tangents: tuple[Tangent, ...]
+    steps: tuple[float, ...]
+    length: float
+    most: int
+    window: tuple[float, float]
+    tolerance: float
+    limits: tuple[float, float, float, float]
+    pace: tuple[float, float, float, float, float]
+
+
+class Stride(NamedTuple):
+    """One plainly good step: the point, the length tried, its distance, and what is left of the limits (at most 1)."""
+
+    found: Corrected
+    tried: float
+    distance: float
+    angle: float
+    chord: float
+    missed: float
+    motion: float
+    following: float  # length to try next
 
 
 class Seed(NamedTuple):
@@ -235,6 +274,18 @@ class Problem(Protocol):
 
     def view(self, u: Array, params: Array) -> Any:
         """What a user sees: FixedPoint or PeriodicOrbit, with spectrum and verdict."""
+
+
+@runtime_checkable
+class StridingProblem(Problem, Protocol):
+    """A problem that can take several steps of a branch in one call."""
+
+    def strides(self, ahead: Stretch) -> Iterator[Stride]:
+        """The steps that are plainly good, one after the other: predicted, corrected and judged as the driver would.
+
+        It ends before the first step that Newton's method or one of the limits refuses, or that leaves the window; the
+        driver then goes on by `correct`. Events between the points are the driver's business.
+        """
 
 
 @runtime_checkable

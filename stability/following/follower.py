@@ -34,6 +34,7 @@ from .points import Point, dot, make_point, rescaled
 from .searching import between, hopped
 from .settings import Progress, Settings
 from .stepping import KINK, Comparison, compare, next_length, predict
+from .striding import Strides
 from .walls import landing, on_wall
 from .wanted import Wanted
 
@@ -81,7 +82,7 @@ class Follower(Iterator[Point]):
         self._norm = self._norm_of(first)
         self._extent: list[tuple[float, float]] = []
         self.wanted = Wanted(settings, self.locator, first)
-        self._monitor, self._edge = Monitor(first), Edge()
+        self._monitor, self._edge, self._strides = Monitor(first), Edge(), Strides(settings)
         self._seen: dict[str, int] = {}
 
     # ------------------------------------------------------------------ iteration
@@ -171,6 +172,12 @@ class Follower(Iterator[Point]):
     def _try(self, h: float) -> tuple[Point, Comparison] | float:
         """An accepted point, or the factor by which to shorten the step."""
         settings, last = self.settings, self.last
+        stride = self._strides.step(last, self._past, h, _ADAPT_EVERY - self.since_adapt)
+        if stride is not None and stride.found.tangent is not None:
+            s, tangent = last.s + stride.distance, stride.found.tangent
+            point = make_point(last.problem, stride.found, tangent, settings.index, s, stride.distance)
+            if np.isfinite(point.spectrum.values).all():
+                return point, Comparison(*stride[2:])
         u, parameter = predict(last, self._past, h)
         landed = self._landed(parameter, u, h)
         if landed is not None:

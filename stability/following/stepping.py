@@ -32,15 +32,20 @@ from numpy.typing import NDArray
 
 from .points import Point
 
-__all__ = ["Comparison", "Steps", "adams_weights", "compare", "predict", "spectral_motion"]
+__all__ = [
+    "LIMITS", "ORDER", "PACE", "Comparison", "Steps", "adams_weights", "compare", "next_length", "predict",
+    "spectral_motion",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 ANGLE, CHORD, MISSED, MOTION, KINK = 0.6, 0.15, 0.2, 0.7, 1e-4
 _FEW = 3
 _APPROACH, _CREEP = 0.8, 0.1
-_FAR, _ORDER = 2.5, 4
+_FAR, ORDER = 2.5, 4
+LIMITS, PACE = (ANGLE, CHORD, MISSED, MOTION), (_FAR, float(_FEW), _APPROACH, _CREEP)
 _GAUSS = 0.5 - 0.5 / math.sqrt(3)
 _SMALL = 6
+LIMITS = (ANGLE, CHORD, MISSED, MOTION)
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,7 @@ class Comparison(NamedTuple):
     chord: float
     missed: float
     motion: float
+    following: float | None = None  # the next length, where it is known already
 
     @property
     def worst(self) -> float:
@@ -85,7 +91,7 @@ def predict(last: Point, past: Sequence[Point], h: float) -> tuple[Array, float]
     """
     tangents, places = [last.tangent], [0.0]
     newer, reach = last, h
-    for point in past[: _ORDER - 1]:
+    for point in past[: ORDER - 1]:
         if point.problem is not last.problem or not newer.step > 0 or (reach > _FAR * newer.step and len(places) > 1):
             break
         places.append(places[-1] - newer.step)
@@ -207,6 +213,8 @@ def _margins(point: Point, values: list[complex], circle: bool) -> list[float]:
 
 def next_length(h: float, seen: Comparison, last: Point, new: Point, steps: Steps) -> float:
     """Aim at half of the limits; shorten where Newton needed many iterations, never more than double."""
+    if seen.following is not None:
+        return seen.following
     factor = 2.0
     if seen.worst > 0:
         factor = min(factor, 0.5 / seen.worst)

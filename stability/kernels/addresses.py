@@ -24,7 +24,10 @@ from numba.core import cgutils
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-__all__ = ["borrowed", "call_field", "call_solver", "native_address", "native_call", "solver_address"]
+__all__ = [
+    "borrowed", "call_eigenvalues", "call_field", "call_solver", "eigenvalue_address", "native_address", "native_call",
+    "solver_address",
+]  # fmt: skip
 
 _DOUBLE = ir.DoubleType()
 _INT64 = ir.IntType(64)
@@ -72,12 +75,43 @@ def call_field(typingctx, address, count, phase, X, P, stride, F, J, Fp):  # typ
     return signature, codegen
 
 
-def solver_address() -> int:
-    """Address of LAPACK's dgesv, from scipy, for `call_solver`."""
+def _lapack(name: str) -> int:
     import scipy.linalg.cython_lapack  # noqa: F401 - the address is looked up in the imported module
     from numba.extending import get_cython_function_address
 
-    return int(get_cython_function_address("scipy.linalg.cython_lapack", "dgesv"))
+    return int(get_cython_function_address("scipy.linalg.cython_lapack", name))
+
+
+def solver_address() -> int:
+    """Address of LAPACK's dgesv, from scipy, for `call_solver`."""
+    return _lapack("dgesv")
+
+
+def eigenvalue_address() -> int:
+    """Address of LAPACK's dgeev, from scipy, for `call_eigenvalues`."""
+    return _lapack("dgeev")
+
+
+@intrinsic
+def call_eigenvalues(typingctx, address, sizes, A, re, im, room):  # type: ignore[no-untyped-def]
+    """``dgeev`` at an address, eigenvalues only: those of A (n * n,), which is overwritten, in re (n,) and im (n,).
+
+    sizes (3,) int32: n, the length of `room`, at least 3 n, and LAPACK's info, which is set (0: done).
+    """
+    signature = types.void(types.int64, sizes, A, re, im, room)
+
+    def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        double, integer, letter = _DOUBLE.as_pointer(), ir.IntType(32).as_pointer(), ir.IntType(8).as_pointer()
+        kinds = [letter, letter, integer, double, integer, double, double, double, integer, double, integer, double]
+        call = _function(builder, args[0], [*kinds, integer, integer])
+        data = [_data(context, builder, sig.args[k], args[k]) for k in range(1, 6)]
+        n, length, info = (builder.gep(data[0], [ir.Constant(_INT64, k)]) for k in range(3))
+        none = cgutils.alloca_once_value(builder, ir.Constant(ir.IntType(8), ord("N")))
+        A, re, im, room = data[1:]
+        builder.call(call, [none, none, n, A, n, re, im, room, n, room, n, room, length, info])
+        return context.get_dummy_value()
+
+    return signature, codegen
 
 
 @intrinsic

@@ -25,7 +25,7 @@ from stability.kernels.caching import kernel
 from stability.kernels.condensation import condense
 from stability.kernels.condensation_reduced import reduce_and_solve
 
-__all__ = ["CONVERGED", "NOT_FINITE", "NO_CONVERGENCE", "SINGULAR", "evaluate", "newton", "solvers"]
+__all__ = ["CONVERGED", "NEWTON", "NOT_FINITE", "NO_CONVERGENCE", "SINGULAR", "evaluate", "newton", "solvers"]
 
 CONVERGED, NO_CONVERGENCE, SINGULAR, NOT_FINITE = 0, 1, 2, 3
 STALLED, ROUNDING = 1e-6, 1e-12  # a correction that no longer falls, and a scaled residual that is rounding
@@ -46,6 +46,13 @@ _REDUCE = (
     types.int64, _array(2),
 )  # fmt: skip
 _condense, _reduce_and_solve = native_call(_CONDENSE), native_call(_REDUCE)
+_INT, _REAL, _VECTOR, _MATRIX, _STACK = types.int64, types.float64, _array(1), _array(2), _array(3)
+NEWTON = (  # the types of `newton`'s arguments, line by line
+    types.UniTuple(_INT, 2), _INT, _INT, _REAL, _VECTOR, _VECTOR, *_RULE, _INDICES, _INDICES, _array(2, constant=True),
+    _VECTOR, _array(1, constant=True), _VECTOR, _MATRIX,
+    _VECTOR, _INT, _VECTOR, _MATRIX, _MATRIX, _VECTOR, _INT, _VECTOR, _MATRIX, _REAL, _REAL, _REAL, _REAL, _INT,
+    _MATRIX, _STACK, _STACK, _VECTOR, _STACK, _array(2, types.int64), _STACK, _STACK, _MATRIX, _VECTOR,
+)  # fmt: skip
 
 
 @functools.cache
@@ -189,13 +196,14 @@ def newton(  # type: ignore[no-untyped-def]
     solvers, field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales, weights,
     stage_weights,
     P, free, u, nodes, Y, T, arc, t, t_Y, t_l, weight_l, ds, tolerance, max_iterations,
-    F, J, Fp, dT, LU, pivots, Z, M, x,
+    F, J, Fp, dT, LU, pivots, Z, M, x, report,
 ):  # fmt: skip
     """Correct u = (nodes, Y, period) and P[free] in place; `arc` = 1 with a tangent (t, t_l), 0 without (P stays).
 
-    nodes and Y are views of u, t_Y of t, stage_weights of weights. Returns (status, iterations, residual, sign);
-    x[0] is the last correction, x[1] the tangent of the curve, not normalised (without `arc` the derivative by
-    P[free]), both as (u, parameter). F, J, Fp, dT, LU, pivots, Z, M hold the last linearisation.
+    nodes and Y are views of u, t_Y of t, stage_weights of weights. Fills report (4,): status, iterations, residual,
+    sign, and returns the status, as a float. x[0] is the last correction, x[1] the tangent of the curve, not normalised
+    (without `arc` the derivative by P[free]), both as (u, parameter). F, J, Fp, dT, LU, pivots, Z, M hold the last
+    linearisation.
     """
     intervals, size, n, count = Y.shape[0], Y.shape[1], nodes.shape[1], u.shape[0]
     own = 1 if period == 0 else 0
@@ -259,7 +267,8 @@ def newton(  # type: ignore[no-untyped-def]
         if arc == 1 and iterations > 1 and change > 2.0 * previous:
             break
         previous = change
-    return status, iterations, residual, sign
+    report[0], report[1], report[2], report[3] = status, iterations, residual, sign
+    return report[0]
 
 
 @kernel(inline=True)

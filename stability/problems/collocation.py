@@ -18,7 +18,7 @@ Problems for Ordinary Differential Equations*, chapters 5, 7, 9.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -28,11 +28,12 @@ import numpy as np
 from ..errors import InputError
 from ..kernels import condensation_newton as kernels
 from ..kernels.meshes import uniform_edges
-from ..protocols import Corrected, Spectrum, Tangent
+from ..protocols import Corrected, Spectrum, Stretch, Stride, Tangent
 from ..systems.stops import refuse_stops
 from .collocation_error import carried_to, multiplier_error, node_error
 from .collocation_kinks import kink_advice, kink_error, passage
 from .collocation_linearisation import CollocationLinearisation, Workspace
+from .collocation_march import strides
 from .orbit_adaption import adapted
 from .orbit_mesh import OrbitMesh
 from .orbit_spectrum import contracted, deflated, eigenvalues, liouville_gap, orbit_spectrum
@@ -309,17 +310,19 @@ class Collocation(OrbitDiscretisation):
         if mesh is not self.mesh:
             weights, stage_weights = self.raised_weights, mesh.split(self.raised_weights)[1]
         rule = mesh.rule
-        x = np.empty((2, mesh.size + arc))
-        status, iterations, residual, sign = kernels.newton(
+        x, report = np.empty((2, mesh.size + arc)), np.empty(4)
+        status = kernels.newton(
             kernels.solvers(), self.flow.address, self.flow.period_address, mesh.span, mesh.phase, mesh.h,
             rule.inverse, rule.matrix, rule.row_sums, rule.update, self.kept,
             self.position, self.closure, self.winding, self.scales, weights, stage_weights, params, index, u,
             nodes, stages, work.T, arc, t, mesh.split(t)[1], t_l, weight, float(ds), float(tolerance),
             limit or _MAX_ITERATIONS[arc], work.F, work.J, work.Fp, work.dT, work.LU, work.pivots, work.Z, work.M, x,
+            report,
         )  # fmt: skip
+        _, iterations, residual, sign = report.tolist()
         if status != kernels.CONVERGED:
             note = _NOTES.get(status) or self._not_finite(mesh, work)
-            return Corrected(u, params, None, float(residual), iterations, 0, None, False, note)
+            return Corrected(u, params, None, residual, int(iterations), 0, None, False, note)
         direction = x[1, : mesh.size]
         new = Tangent(direction, 1.0, 1.0)
         if arc:
@@ -331,7 +334,11 @@ class Collocation(OrbitDiscretisation):
             linearisation = CollocationLinearisation(self, u, params, work, sign, correction)
             if arc:
                 self._memo["tangent"] = (u, index, new)
-        return Corrected(u, params, new, float(residual), iterations, int(sign), linearisation, True)
+        return Corrected(u, params, new, residual, int(iterations), int(sign), linearisation, True)
+
+    def strides(self, ahead: Stretch) -> Iterator[Stride]:
+        """Several steps in one compiled call; see `protocols.StridingProblem`."""
+        return strides(self, ahead)
 
     def _not_finite(self, mesh: OrbitMesh, work: Workspace) -> str:
         bad, why = np.argwhere(~np.isfinite(work.F)), self.evaluations.failure()
@@ -400,15 +407,17 @@ class Collocation(OrbitDiscretisation):
         The error is that by degree m + 1, the trivial multiplier's distance from 1, Liouville's gap and, past kinks,
         twice the distance from multipliers by integration (`collocation_kinks`) together.
         """
-        M, error = linearisation.spectral, 0.0
+        M = linearisation.spectral
         largest = float(np.abs(M).max())
         if not largest < np.inf:
             return orbit_spectrum(np.full(self.mesh.n - self.mesh.own, np.nan, complex), np.inf)
-        if self.mesh.own:
-            direction = self._direction_of_flow(linearisation)
-            M, error = deflated(M, direction)
-        values = eigenvalues(M)
-        error += multiplier_error(self, linearisation, values, direction if self.mesh.own else None)
+        direction = self._direction_of_flow(linearisation) if self.mesh.own else None
+        known = vars(linearisation).get("nontrivial")  # of steps that were taken together
+        if known is None:
+            matrix, error = (M, 0.0) if direction is None else deflated(M, direction)
+            known = eigenvalues(matrix), error
+        values, error = known
+        error += multiplier_error(self, linearisation, values, direction)
         error += kink_error(self, linearisation, values) + 1e-15 * largest * len(M)
         factors = linearisation.work.M
         if self.halved:

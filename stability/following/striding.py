@@ -1,0 +1,67 @@
+"""Plain steps, several at a time, where a problem can take them in one call.
+
+A `StridingProblem` predicts, corrects and judges by itself, by the limits and the pace of `stepping`, and gives back
+the steps that are plainly good. The first that is not, is taken here step by step; so is a step that turns out to need
+another length than the one it was made with, and all that follow from it are dropped. Events between the points are
+looked for as between any others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..protocols import Stretch, Stride
+from .points import Point
+from .settings import Settings
+from .stepping import LIMITS, ORDER, PACE
+
+__all__ = ["Strides"]
+
+Array = NDArray[np.float64]
+
+
+class Strides:
+    """The steps made ahead of one side of a branch."""
+
+    def __init__(self, settings: Settings) -> None:
+        self._settings = settings
+        self._steps: Iterator[Stride] = iter(())
+        self._left = 0  # so many may still come
+        self._from: Array | None = None  # where the next of them begins
+        self._refused: Array | None = None  # where the last of them was not plainly good
+
+    def step(self, last: Point, past: Sequence[Point], h: float, count: int) -> Stride | None:
+        """The step of length h from `last`, the first of `count` at most that are made; None: look at it closely."""
+        if last.u is self._refused:
+            return None
+        if not (last.u is self._from and self._left):
+            self._begin(last, past, h, count)
+        made = next(self._steps, None)
+        if made is None or made.tried != h:
+            self._left, self._refused = 0, last.u
+            return None
+        self._left -= 1
+        self._from = made.found.u
+        return made
+
+    def _begin(self, last: Point, past: Sequence[Point], h: float, count: int) -> None:
+        settings, problem = self._settings, last.problem
+        self._steps, self._left = iter(()), count
+        strides = getattr(problem, "strides", None)
+        if strides is None:
+            return
+        points = [last]
+        for point in past[: ORDER - 1]:
+            if point.problem is not problem:
+                break
+            points.append(point)
+        self._steps = strides(
+            Stretch(
+                last.u, last.params, settings.name, last.spectrum.values, tuple(p.tangent for p in points),
+                tuple(p.step for p in points), h, count, (settings.low, settings.high), settings.tolerance, LIMITS,
+                (settings.steps.longest, *PACE),
+            )
+        )  # fmt: skip

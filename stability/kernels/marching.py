@@ -1,0 +1,304 @@
+r"""Several steps of a branch of periodic orbits in one compiled call: predict, correct, compare, choose the next step.
+
+What `following/stepping.py` says in Python, for points z = (u, lambda) on one mesh with unit tangents t and the inner
+product <(u, l), (v, k)> = sum w u v + weight^2 l k:
+
+    predict    z = z_0 + int_0^h sum_i t_i l_i(s) ds                       Adams, at most four tangents
+    correct    `condensation_newton.newton`, orthogonally to t_0
+    compare    angle(t_0, t_1), angle(z_1 - z_0, t_0 + t_1), |z_1 - z| / |z_1 - z_0|, motion of the multipliers
+    next       half of the limits, few Newton iterations, not beyond where a multiplier becomes critical
+
+The march ends before the first step that is not plainly good: one that Newton or a check refuses, or that leaves the
+window of the parameter. Whoever asked for it then goes on step by step, and looks for events between the points; here
+nothing is decided but how far to go. Multipliers: closed form for one or two, LAPACK's dgeev by its address otherwise;
+of an autonomous orbit the direction f of the flow is removed by a reflection (`problems/orbit_spectrum.py`).
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from stability.kernels.addresses import call_eigenvalues, call_field, eigenvalue_address, native_address, native_call
+from stability.kernels.caching import kernel
+from stability.kernels.condensation_newton import NEWTON, newton, solvers
+from stability.kernels.condensation_reduced import summary
+
+__all__ = ["addresses", "march"]
+
+_newton = native_call(NEWTON)
+
+
+@functools.cache
+def addresses() -> tuple[int, int, int, int]:
+    """Addresses for `march`: Newton's method, its two solvers, LAPACK's eigenvalues."""
+    return native_address(newton, NEWTON), *solvers(), eigenvalue_address()
+
+
+@kernel(inline=True)
+def _predict(points, tangents, rates, steps, k, now, h, far, guess):  # type: ignore[no-untyped-def]
+    """guess (N,) = the predicted u at arclength h from point k, whose tangent is row `now`; returns lambda's change."""
+    places, weights = np.empty(4), np.empty(4)
+    places[0], count, reach = 0.0, 1, h
+    while count < 4 and now - count >= 0:
+        newer = steps[now - count + 1]
+        if not newer > 0.0 or (reach > far * newer and count > 1):
+            break
+        places[count] = places[count - 1] - newer
+        reach = newer
+        count += 1
+        if h > far * steps[now]:
+            break
+    half, inner = 0.5 * h, 0.5 - 0.5 / np.sqrt(3.0)
+    change = 0.0
+    for i in range(count):
+        p = q = half
+        for j in range(count):
+            if j != i:
+                p *= (inner * h - places[j]) / (places[i] - places[j])
+                q *= ((1.0 - inner) * h - places[j]) / (places[i] - places[j])
+        weights[i] = p + q
+        change += weights[i] * rates[now - i]
+    for a in range(guess.shape[0]):
+        value = points[k, a]
+        for i in range(count):
+            value += weights[i] * tangents[now - i, a]
+        guess[a] = value
+    return change
+
+
+@kernel(inline=True)
+def _scaled(product, S, scales, M):  # type: ignore[no-untyped-def]
+    """M = D^-1 S^-1 Phi D, S^-1 = S^T."""
+    n = scales.shape[0]
+    for a in range(n):
+        for b in range(n):
+            value = 0.0
+            for c in range(n):
+                value += S[c, a] * product[c, b]
+            M[a, b] = value * scales[b] / scales[a]
+
+
+@kernel(inline=True)
+def _without_flow(M, f, A, B):  # type: ignore[no-untyped-def]
+    """A (n - 1, n - 1): M without the direction f, by reflection on the first axis; returns |M f - f| / |f|."""
+    n = M.shape[0]
+    size = gap = 0.0
+    for a in range(n):
+        value = -f[a]
+        for b in range(n):
+            value += M[a, b] * f[b]
+        gap += value * value
+        size += f[a] * f[a]
+    gap = np.sqrt(gap / size)
+    f[0] += np.sqrt(size) if f[0] >= 0.0 else -np.sqrt(size)
+    size = 0.0
+    for a in range(n):
+        size += f[a] * f[a]
+    for b in range(n):  # H M H, H = I - 2 f f^T / |f|^2
+        value = 0.0
+        for a in range(n):
+            value += f[a] * M[a, b]
+        for a in range(n):
+            B[a, b] = M[a, b] - 2.0 * value / size * f[a]
+    for a in range(1, n):
+        value = 0.0
+        for b in range(n):
+            value += B[a, b] * f[b]
+        for b in range(1, n):
+            A[a - 1, b - 1] = B[a, b] - 2.0 * value / size * f[b]
+    return gap
+
+
+@kernel(inline=True)
+def _multipliers(address, A, count, packed, re, im, room):  # type: ignore[no-untyped-def]
+    """Eigenvalues of the leading (count, count) block of A; False where they could not be had."""
+    if count <= 2:
+        a, b, c, d = A[0, 0], 0.0, 0.0, 0.0
+        if count == 1:
+            re[0], im[0] = a, 0.0
+            return abs(a) < np.inf
+        b, c, d = A[0, 1], A[1, 0], A[1, 1]
+        half, square = 0.5 * (a + d), 0.25 * (a - d) * (a - d) + b * c
+        if square >= 0.0:
+            re[0] = half + (np.sqrt(square) if half >= 0.0 else -np.sqrt(square))
+            re[1] = (a * d - b * c) / re[0] if re[0] != 0.0 else 0.0
+            im[0] = im[1] = 0.0
+        else:
+            re[0] = re[1] = half
+            im[0] = np.sqrt(-square)
+            im[1] = -im[0]
+        return abs(re[0]) < np.inf and abs(im[0]) < np.inf
+    for a in range(count):
+        for b in range(count):
+            packed[b * count + a] = A[a, b]
+            if not abs(A[a, b]) < np.inf:
+                return False
+    sizes = np.zeros(3, np.int32)
+    sizes[0], sizes[1] = count, room.shape[0]
+    call_eigenvalues(address, sizes, packed, re, im, room)
+    for i in range(1, count):  # by descending modulus; pairs are equal and stay together
+        x, y = re[i], im[i]
+        size = x * x + y * y
+        place = i
+        while place > 0 and re[place - 1] ** 2 + im[place - 1] ** 2 < size:
+            re[place], im[place] = re[place - 1], im[place - 1]
+            place -= 1
+        re[place], im[place] = x, y
+    return sizes[2] == 0
+
+
+@kernel(inline=True)
+def _motion(re, im, k, count):  # type: ignore[no-untyped-def]
+    """Hausdorff distance of the rows k and k + 1 of multipliers, in the chordal metric."""
+    worst = 0.0
+    for way in range(2):
+        here, there = k + way, k + 1 - way
+        for i in range(count):
+            least, size = np.inf, 1.0 + re[here, i] ** 2 + im[here, i] ** 2
+            for j in range(count):
+                gap = (re[here, i] - re[there, j]) ** 2 + (im[here, i] - im[there, j]) ** 2
+                least = min(least, gap / (size * (1.0 + re[there, j] ** 2 + im[there, j] ** 2)))
+            worst = max(worst, least)
+    return np.sqrt(worst)
+
+
+@kernel(inline=True)
+def _margins(re, im, k, count, out):  # type: ignore[no-untyped-def]
+    """out (count + 2,): signed distances to +1 and -1, then the growth of each multiplier in order of size."""
+    for side in range(2):
+        limit = 1.0 - 2.0 * side
+        nearest, a, b = np.inf, 1.0, 0.0
+        for i in range(count):
+            x, y = re[k, i] - limit, im[k, i]
+            nearest = min(nearest, np.sqrt(x * x + y * y))
+            a, b = a * x - b * y, a * y + b * x
+        out[side] = 0.0 if a == 0.0 else (nearest if a > 0.0 else -nearest)
+    for i in range(count):
+        size = re[k, i] ** 2 + im[k, i] ** 2
+        growth = 0.5 * np.log(size) if size > 0.0 else -np.inf
+        place = i + 2
+        while place > 2 and out[place - 1] > growth:
+            out[place] = out[place - 1]
+            place -= 1
+        out[place] = growth
+
+
+@kernel(inline=True)
+def _room(re, im, k, count, before, after):  # type: ignore[no-untyped-def]
+    """Steps like the last one until some multiplier, at its present rate, is critical."""
+    _margins(re, im, k, count, before)
+    _margins(re, im, k + 1, count, after)
+    least = np.inf
+    for i in range(count + 2):
+        x, y = before[i], after[i]
+        if x * y > 0.0 and abs(y) < abs(x):
+            least = min(least, abs(y) / (abs(x) - abs(y)))
+    return least
+
+
+@kernel(inline=True)
+def _compare(weights, weight, points, tangents, rates, guess, k, now, change, miss):  # type: ignore[no-untyped-def]
+    """(distance, angle of the tangents, angle of chord and mean tangent, miss over distance) of point k + 1."""
+    square = cosine = along = missed = 0.0
+    for a in range(weights.shape[0]):
+        du, t0, t1 = points[k + 1, a] - points[k, a], tangents[now, a], tangents[now + 1, a]
+        gap = points[k + 1, a] - guess[a]
+        square += weights[a] * du * du
+        cosine += weights[a] * t0 * t1
+        along += weights[a] * du * (t0 + t1)
+        missed += weights[a] * gap * gap
+    w2 = weight * weight
+    distance = np.sqrt(square + w2 * change * change)
+    cosine += w2 * rates[now] * rates[now + 1]
+    angle = np.arccos(max(-1.0, min(1.0, cosine)))
+    if distance == 0.0:
+        return 0.0, angle, 0.0, 0.0
+    along += w2 * change * (rates[now] + rates[now + 1])
+    chord = np.arccos(max(-1.0, min(1.0, along / (distance * np.sqrt(max(2.0 + 2.0 * cosine, 1e-30))))))
+    return distance, angle, chord, np.sqrt(missed + w2 * miss * miss) / distance
+
+
+@kernel
+def march(  # type: ignore[no-untyped-def]
+    by, field, period, span, phase, h, W, A, row_sums, update, b, leading, kept, position, S, jump, scales, weights,
+    stage_weights, tolerance, max_iterations, free, own, past, weight, window, limits, pace, length,
+    P, points, tangents, rates, steps, re, im, T, F, J, Fp, dT, LU, pivots, Z, M, x, products, spectral, report, seen,
+):  # fmt: skip
+    """Take steps until one is not plainly good; returns how many were taken, at most K.
+
+    Row 0 of P (K + 1, m), points (K + 1, N), re and im (K + 1, n) is the last point of the branch, row `past` of
+    tangents (past + 1 + K, N), rates and steps its tangent and the length of the step to it, earlier ones before.
+    limits : of angle, chord, miss, motion; pace : longest step, far, few, approach, creep.
+    The rows 1 .. are filled, with T, F, J, Fp, dT, Z, M of each step, products and spectral (K, n, n) the
+    monodromy matrix as it is and scaled, report (K, 4) of Newton's method, and seen (K, 10): length tried, distance, then
+    angle, chord, miss and motion over their limits, the next length, int tr J ds, roughness, error of the trivial one.
+    """
+    taken, size, n = 0, points.shape[1], scales.shape[0]
+    intervals, inner = Z.shape[1], Z.shape[2]
+    guess, f, column = np.empty(size), np.empty((1, n)), np.empty((1, n, P.shape[1]))
+    square, other, packed = np.empty((n, n)), np.empty((n, n)), np.empty(n * n)
+    before, after, spare = np.empty(n + 2), np.empty(n + 2), np.empty(12 * n)
+    first = (intervals + 1) * n
+    count = n - own
+    while taken < M.shape[0]:
+        k, now = taken, past + taken
+        step = min(length, pace[0])
+        change = _predict(points, tangents, rates, steps, k, now, step, pace[1], guess)
+        parameter = P[k, free] + change
+        if not window[0] <= parameter <= window[1]:
+            break
+        P[k + 1] = P[k]
+        P[k + 1, free] = parameter
+        points[k + 1] = guess
+        u, t = points[k + 1], tangents[now]
+        nodes = u[:first].reshape((intervals + 1, n))
+        stages = u[first : first + intervals * inner].reshape((intervals, inner))
+        status = _newton(by[0], (
+            (by[1], by[2]), field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales,
+            weights, stage_weights, P[k + 1], free, u, nodes, stages, T[k], 1, t,
+            t[first : first + intervals * inner].reshape((intervals, inner)), rates[now], weight, 0.0, tolerance,
+            max_iterations, F[k], J[k], Fp[k], dT[k], LU, pivots, Z[k], M[k], x[k], report[k],
+        ))  # fmt: skip
+        parameter = P[k + 1, free]
+        if status != 0.0 or not window[0] <= parameter <= window[1]:
+            break
+        total = (weight * x[k, 1, size]) ** 2
+        for a in range(size):
+            total += weights[a] * x[k, 1, a] * x[k, 1, a]
+        total = np.sqrt(total)
+        for a in range(size):
+            tangents[now + 1, a] = x[k, 1, a] / total
+        rates[now + 1] = x[k, 1, size] / total
+        moved = parameter - P[k, free]
+        distance, angle, chord, miss = _compare(
+            weights, weight, points, tangents, rates, guess, k, now, moved, moved - change
+        )
+        seen[k, 7], seen[k, 8] = summary(M[k], J[k], h, b, leading, scales, nodes, stages, products[k])
+        _scaled(products[k], S, scales, spectral[k])
+        seen[k, 9] = 0.0
+        matrix = spectral[k]
+        if own == 1:
+            call_field(field, 1, phase, nodes, P[k + 1], 0, f, other, column)
+            for a in range(n):
+                f[0, a] /= scales[a]
+            seen[k, 9] = _without_flow(matrix, f[0], square, other)
+            matrix = square
+        if not _multipliers(by[3], matrix, count, packed, re[k + 1], im[k + 1], spare):
+            break
+        seen[k, 0], seen[k, 1] = step, distance
+        seen[k, 2], seen[k, 3], seen[k, 4] = angle / limits[0], chord / limits[1], miss / limits[2]
+        seen[k, 5] = _motion(re, im, k, count) / limits[3]
+        worst = max(max(seen[k, 2], seen[k, 3]), max(seen[k, 4], seen[k, 5]))
+        if not (worst <= 1.0 and 0.0 < distance <= 3.0 * step):
+            break
+        steps[now + 1] = distance
+        factor = 2.0 if worst == 0.0 else min(2.0, 0.5 / worst)
+        if report[k, 1] > pace[2]:
+            factor = min(factor, 1.2 if report[k, 1] == pace[2] + 1.0 else 0.7)
+        ahead = max(pace[3] * _room(re, im, k, count, before, after) * distance, pace[4] * pace[0])
+        length = min(pace[0], min(distance * max(0.4, factor), ahead))
+        seen[k, 6] = length
+        taken += 1
+    return taken
