@@ -233,7 +233,7 @@ def march(  # type: ignore[no-untyped-def]
     limits : of angle, chord, miss, motion; pace : longest step, far, few, approach, creep.
     The rows 1 .. are filled, with T, F, J, Fp, dT, Z, M of each step, products and spectral (K, n, n) the
     monodromy matrix as it is and scaled, report (K, 4) of Newton's method, and seen (K, 10): length tried, distance, then
-    angle, chord, miss and motion over their limits, the next length, int tr J ds, roughness, error of the trivial one.
+    angle, chord, miss and motion over their limits, the next length, int tr J ds, roughness, |M f - f| / |f|.
     """
     taken, size, n = 0, points.shape[1], scales.shape[0]
     intervals, inner = Z.shape[1], Z.shape[2]

@@ -26,17 +26,18 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..integration.switches import has_switches
 from ..kernels import condensation_newton as kernels
 from ..kernels.meshes import uniform_edges
 from ..protocols import Corrected, Spectrum, Stretch, Stride, Tangent
 from ..systems.stops import refuse_stops
-from .collocation_error import carried_to, multiplier_error, node_error
-from .collocation_kinks import kink_advice, kink_error, passage
+from .collocation_error import carried_to, node_error
+from .collocation_kinks import kink_advice, passage
 from .collocation_linearisation import CollocationLinearisation, Workspace
 from .collocation_march import strides
+from .collocation_spectrum import collocation_spectrum
 from .orbit_adaption import adapted
 from .orbit_mesh import OrbitMesh
-from .orbit_spectrum import contracted, deflated, eigenvalues, liouville_gap, orbit_spectrum
 from .orbit_starts import doubled_problem
 from .orbit_symmetry import Mirror, broken, chosen, symmetric_doubled
 from .orbits import OrbitDiscretisation, one_period, whole_number, winding_vector
@@ -407,42 +408,17 @@ class Collocation(OrbitDiscretisation):
         The error is that by degree m + 1, the trivial multiplier's distance from 1, Liouville's gap and, past kinks,
         twice the distance from multipliers by integration (`collocation_kinks`) together.
         """
-        M = linearisation.spectral
-        largest = float(np.abs(M).max())
-        if not largest < np.inf:
-            return orbit_spectrum(np.full(self.mesh.n - self.mesh.own, np.nan, complex), np.inf)
-        direction = self._direction_of_flow(linearisation) if self.mesh.own else None
-        known = vars(linearisation).get("nontrivial")  # of steps that were taken together
-        if known is None:
-            matrix, error = (M, 0.0) if direction is None else deflated(M, direction)
-            known = eigenvalues(matrix), error
-        values, error = known
-        error += multiplier_error(self, linearisation, values, direction)
-        error += kink_error(self, linearisation, values) + 1e-15 * largest * len(M)
-        factors = linearisation.work.M
-        if self.halved:
-            factors = np.concatenate([factors, self.closure[None]])  # S^-1 = S
-        values = contracted(values, factors)
-        error += liouville_gap(values, self._growth_of_volume(linearisation), self.orientation)
-        return orbit_spectrum(values, error, self._area_preserving(linearisation))
+        return collocation_spectrum(self, linearisation)
 
-    def _growth_of_volume(self, linearisation: CollocationLinearisation) -> float:
-        """int tr J dt over the span of the mesh, by the mesh's own Gauss quadrature."""
-        return linearisation.sigma * linearisation.summary[1]
+    @cached_property
+    def kinked(self) -> bool:
+        """Whether the equations have kinks that an orbit may pass."""
+        return has_switches(self.system)
 
     @cached_property
     def orientation(self) -> float:
         """Sign of det S."""
         return math.copysign(1.0, float(np.linalg.det(self.closure)))
-
-    def _area_preserving(self, linearisation: CollocationLinearisation) -> bool:
-        """Whether a forced system of two states has no divergence, hence det M = 1."""
-        J = linearisation.work.J
-        if self.mesh.n != 2 or self.mesh.own or self.orientation < 0 or J[0, 0, 0] + J[0, 1, 1] != 0.0:
-            return False
-        if float(np.abs(J[:, 0, 0] + J[:, 1, 1]).max()) != 0.0:
-            return False
-        return self.flow.divergence_free(linearisation.params)
 
     def spectral_of(self, product: Array) -> Array:
         """M of the fundamental matrix Phi."""
@@ -450,7 +426,7 @@ class Collocation(OrbitDiscretisation):
             product = self.closure @ product  # S^-1 = S
         return np.asarray(product * self.scales / self.scales[:, None])
 
-    def _direction_of_flow(self, linearisation: CollocationLinearisation) -> Array:
+    def direction_of_flow(self, linearisation: CollocationLinearisation) -> Array:
         """f at phase zero over the scales: the direction of the trivial multiplier."""
         start = self.mesh.split(linearisation.u)[0][:1]
         value = self.evaluations.F(None, np.ascontiguousarray(start), linearisation.params)[0]

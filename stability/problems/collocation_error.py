@@ -75,7 +75,7 @@ def _is_singular(problem: Collocation, u: Array, params: Array) -> bool:
     if L.sign == 0.0 or not np.isfinite(M).all():
         return False
     if problem.mesh.own:
-        direction = problem._direction_of_flow(L)
+        direction = problem.direction_of_flow(L)
         if not direction.any():  # an orbit at its birth stands still
             return False
         M = deflated(M, direction)[0]

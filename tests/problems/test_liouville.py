@@ -13,6 +13,7 @@ import pytest
 import sympy as sp
 
 import stability as st
+from stability.problems.collocation_spectrum import growth_of_volume
 from stability.problems.orbit_spectrum import liouville_gap
 
 
@@ -24,8 +25,8 @@ def solved(**params: float):
 
 def test_volume_by_quadrature_is_that_of_a_constant_divergence():
     problem, L = solved(Omega=0.5)
-    assert problem._growth_of_volume(L) == pytest.approx(-2 * 1e-4 * 2 * np.pi / 0.5, rel=1e-13)
-    assert liouville_gap(problem.spectrum(L).values, problem._growth_of_volume(L)) < 1e-11
+    assert growth_of_volume(L) == pytest.approx(-2 * 1e-4 * 2 * np.pi / 0.5, rel=1e-13)
+    assert liouville_gap(problem.spectrum(L).values, growth_of_volume(L)) < 1e-11
 
 
 @pytest.mark.parametrize("damage", [3e-3, 1e-2])
@@ -90,4 +91,4 @@ def test_halved_orbits_keep_the_orientation_of_their_symmetry():
     for problem in problems:
         p = problem.system.parameter_vector()
         L = problem.linearise(problem.start(p), p)
-        assert liouville_gap(problem.spectrum(L).values, problem._growth_of_volume(L), problem.orientation) < 1e-10
+        assert liouville_gap(problem.spectrum(L).values, growth_of_volume(L), problem.orientation) < 1e-10
