@@ -214,9 +214,10 @@ def _at_once(balance: Balance, a: Array, value: float) -> Array | None:
     Newton's method on few samples, then on all with the slopes found. It is the same curve if each value is where the
     two before lead, as near as one step of Newton's method.
     """
-    if balance.begun is None:
+    x = a * math.nan if balance.begun is None else balance.begun(a, value)
+    if not np.isfinite(x).all():  # a softening spring has no backbone at large amplitudes
         return None
-    x, slope, damping = balance.begun(a, value), np.ones(len(a)), a
+    slope, damping = np.ones(len(a)), a
     for few in (True, False):
         for _ in range(8):
             if few:
@@ -235,7 +236,7 @@ def _at_once(balance: Balance, a: Array, value: float) -> Array | None:
                 break
         else:
             return None
-    steps = np.diff(np.log(x))
+    steps = np.diff(np.log(x / value))
     return damping / balance.exciting(x) if (np.abs(np.diff(steps)) < _MOST).all() else None
 
 
