@@ -22,6 +22,7 @@ from ..problems.defining import Located, locate
 from ..protocols import Tangent
 from ..words import Kind
 from .events import Changes, changes, supported, turns
+from .narrowing import narrowed
 from .points import Point, dot, make_point, smooth_tests, tangent_of
 
 __all__ = ["Found", "Locator", "hermite", "shown"]
@@ -165,6 +166,9 @@ class Locator:
             return []
         critical = a.problem.critical
         kinds = change.suspects(critical.pair, critical.minus is not None)
+        alone = self._alone(kinds[0], a, b) if len(kinds) == 1 and change.is_one(kinds[0]) else None
+        if alone is not None:
+            return [alone]
         located = [f for f in (self.attempt(kind, a, b) for kind in kinds) if f is not None]
         if _is_turning_crossing(change, located, chord_length(a, b)) or self._turns_at_crossing(a, b, change, located):
             located = [f for f in located if f.kind is not Kind.FOLD]
@@ -181,6 +185,16 @@ class Locator:
         if middle is None:
             return [] if change.nothing else self._leftover(a, b, change)
         return self.resolve(a, middle, level + 1) + self.resolve(middle, b, level + 1)
+
+    def _alone(self, kind: Kind, a: Point, b: Point) -> Found | None:
+        """A fold or a period doubling that is the one event between a and b; None where it is not found quickly."""
+        whole = a.problem.critical.circle and not getattr(a.problem, "own", 0)  # no trivial multiplier to take out
+        if not (kind is Kind.FOLD or (kind is Kind.PERIOD_DOUBLING and whole)):
+            return None
+        made = narrowed(kind, a, b, self.free, self.k, min(1e-11, self.tolerance))
+        if made is None or not _shows(kind, made[0]):
+            return None
+        return Found(made[0], kind, (a.parameter, b.parameter), made[1])
 
     def _turns_at_crossing(self, a: Point, b: Point, change: Changes, located: list[Found]) -> bool:
         """Whether only a branch point could be located where the parameter turns too, and the turn is right there.
@@ -349,17 +363,23 @@ def _projected(
     return Tangent(u / length, parameter / length, weight) if length > 0 and math.isfinite(length) else None
 
 
-def _signature(kind: Kind, located: Located, point: Point) -> bool:
-    """Whether the located point is what its kind says."""
-    critical, values = point.problem.critical, point.spectrum.values
-    allowed = _SIGNATURE + 100 * point.spectrum.error
+def _shows(kind: Kind, point: Point) -> bool:
+    """Whether a point is the fold or the period doubling it is taken for."""
     if kind is Kind.FOLD:
         return abs(point.tangent.parameter * point.tangent.weight) < 1e-4
+    values = point.spectrum.values
+    near = np.abs(values - (point.problem.critical.minus or 0.0))
+    return bool(values.size) and float(near.min()) < _SIGNATURE + 100 * point.spectrum.error
+
+
+def _signature(kind: Kind, located: Located, point: Point) -> bool:
+    """Whether the located point is what its kind says."""
+    if kind in (Kind.FOLD, Kind.PERIOD_DOUBLING):
+        return _shows(kind, point)
+    critical, values = point.problem.critical, point.spectrum.values
+    allowed = _SIGNATURE + 100 * point.spectrum.error
     if kind is Kind.BRANCH_POINT:
         return abs(float(located.extra[0])) < _UNFOLDING
-    if kind is Kind.PERIOD_DOUBLING:
-        near = np.abs(values - (critical.minus or 0.0))
-        return bool(values.size) and float(near.min()) < allowed
     extra, paired = float(located.extra[0]), values[values.imag != 0]
     if not paired.size:
         return False
