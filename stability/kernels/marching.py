@@ -242,16 +242,18 @@ def march(  # type: ignore[no-untyped-def]
     before, after, spare = np.empty(n + 2), np.empty(n + 2), np.empty(12 * n)
     first = (intervals + 1) * n
     count = n - own
-    while taken < M.shape[0]:
-        k, now = taken, past + taken
+    for k in range(M.shape[0]):  # places from a range: a literal 0 would be a type of its own, and compiled once more
+        now = past + k
         step = min(length, pace[0])
         change = _predict(points, tangents, rates, steps, k, now, step, pace[1], guess)
         parameter = P[k, free] + change
         if not window[0] <= parameter <= window[1]:
             break
-        P[k + 1] = P[k]
+        for a in range(P.shape[1]):
+            P[k + 1, a] = P[k, a]
         P[k + 1, free] = parameter
-        points[k + 1] = guess
+        for a in range(size):
+            points[k + 1, a] = guess[a]
         u, t = points[k + 1], tangents[now]
         nodes = u[:first].reshape((intervals + 1, n))
         stages = u[first : first + intervals * inner].reshape((intervals, inner))
@@ -300,5 +302,5 @@ def march(  # type: ignore[no-untyped-def]
         ahead = max(pace[3] * _room(re, im, k, count, before, after) * distance, pace[4] * pace[0])
         length = min(pace[0], min(distance * max(0.4, factor), ahead))
         seen[k, 6] = length
-        taken += 1
+        taken = k + 1
     return taken
