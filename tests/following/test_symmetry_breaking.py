@@ -367,3 +367,19 @@ def test_families_of_orbits_list_images_once():
 def test_criticality_word_is_that_of_the_pitchfork(loop):
     assert loop[0]["BP1"].criticality is Criticality.SUPERCRITICAL
     assert loop[1].solution(3).verdict is st.Verdict.STABLE or loop[1].solution(len(loop[1]) - 4).verdict is st.Verdict.STABLE
+
+
+def test_asymmetric_loop_closes_when_both_halves_are_followed():
+    """From the window (16, 0.3), where the loop is a small part of the parameter's width: born once, closed, no twins.
+
+    Witness: the same loop with its second half as the image of the first.
+    """
+    system = st.models.duffing_textbook(delta=0.1, gamma=25.0)
+    branch = st.continuation(st.Collocation(system, symmetry="auto"), "omega", (16.0, 0.3), stop_at=("BP1",))
+    half = st.continuation(st.switch(branch["BP1"]), "omega", (16.0, 0.3))
+    # a user's event need not have the symmetry: with one, both halves are followed
+    full = st.continuation(st.switch(branch["BP1"]), "omega", (16.0, 0.3), events=lambda orbit: 1.0)
+    assert half.status is full.status is st.Status.CLOSED_LOOP
+    assert half.labels == full.labels
+    for a, b in zip(half.special, full.special):
+        assert a.params["omega"] == pytest.approx(b.params["omega"], abs=1e-9)
