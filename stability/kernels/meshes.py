@@ -35,15 +35,20 @@ def monitor(edges: np.ndarray, leading: np.ndarray, degree: int, breaks: np.ndar
     """rho (N,) on the intervals; `leading` (N, n) is the m-th derivative of the scaled states over m!."""
     h = np.diff(edges)
     middle = edges[:-1] + h / 2
-    distance = np.diff(middle, append=middle[0] + 1.0)
-    jump = np.abs(np.roll(leading, -1, axis=0) - leading) / distance[:, None]
+    distance = np.empty(len(h))
+    distance[:-1], distance[-1] = middle[1:] - middle[:-1], middle[0] + 1.0 - middle[-1]
+    right = np.empty_like(leading)  # jumps at the right edges of the intervals
+    right[:-1], right[-1] = leading[1:] - leading[:-1], leading[0] - leading[-1]
+    right = np.abs(right) / distance[:, None]
+    left = np.concatenate([right[-1:], right[:-1]])
+    if not len(breaks):
+        return np.asarray((0.5 * (left + right)).max(axis=1) ** (1.0 / (degree + 1)))
     closed = np.ones(len(h), bool)  # closed[j]: the jump at the right edge of interval j counts
     for b in breaks:
         closed[np.argmin(np.abs(edges[1:] - (b if b > 0 else 1.0)))] = False
     weight = np.stack([np.roll(closed, 1), closed]).astype(float)
     total = weight.sum(axis=0)
-    sides = np.stack([np.roll(jump, 1, axis=0), jump])
-    average = (weight[:, :, None] * sides).sum(axis=0) / np.maximum(total, 1.0)[:, None]
+    average = (weight[:, :, None] * np.stack([left, right])).sum(axis=0) / np.maximum(total, 1.0)[:, None]
     average[total == 0] = np.abs(leading)[total == 0] / h[total == 0, None]
     return np.asarray(average.max(axis=1) ** (1.0 / (degree + 1)))
 

@@ -121,6 +121,7 @@ def multiplier_error(
     3 and the square of the growth of the m-th derivative (up to 2): nodes have twice the order of the polynomial.
     """
     solution, roughness = linearisation.solution, linearisation.summary[2]
+    problem._memo["roughness"] = solution, roughness
     carried, _ = carried_errors(problem, solution, roughness)
     if min((abs(abs(z) - 1) for z in values.tolist()), default=1.0) > 1e3 * carried + 1e-5:
         return carried
@@ -160,5 +161,8 @@ def carried_to(problem: Collocation, new: Collocation) -> None:
 
 def _roughness(problem: Collocation, u: Array) -> float:
     """Largest m-th derivative of the scaled states."""
+    known = problem._memo.get("roughness")
+    if known is not None and known[0] is u:
+        return float(known[1])
     nodes, stages, _ = problem.mesh.split(u)
     return float(np.abs(problem.mesh.leading(nodes, stages) / problem.scales).max())

@@ -15,6 +15,9 @@ still leaves at once.
 from __future__ import annotations
 
 import dataclasses
+import math
+import operator
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -44,20 +47,27 @@ class Natural(NamedTuple):
     units: Array | float = 1.0
 
 
+@lru_cache(maxsize=64)
+def _places(states: tuple[str, ...], names: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Where the named coordinates are among the states, and their velocities; without those that are no states."""
+    velocities = tuple(f"{name}_dot" for name in names)
+    first, second = (tuple(states.index(k) for k in group if k in states) for group in (names, velocities))
+    return first, second
+
+
 def natural_sizes(system: System, period: float) -> Natural:
     """Smallest scales: a small angle, and the velocity of swinging by it once a period; 0 elsewhere.
 
     A velocity counts in 2 pi / period of its coordinate, whatever the unit of time.
     """
     sizes, units = np.zeros(system.n), np.ones(system.n)
-    if np.isfinite(period) and period > 0:
-        for name in system.coordinates:
-            if f"{name}_dot" in system.states:
-                units[system.states.index(f"{name}_dot")] = 2 * np.pi / period
-    for angle in system.angles:
-        for name, size in ((angle, _ANGLE), (f"{angle}_dot", 2 * np.pi * _ANGLE / period)):
-            if name in system.states and np.isfinite(size):
-                sizes[system.states.index(name)] = size
+    if math.isfinite(period) and period > 0:
+        units[list(_places(system.states, system.coordinates)[1])] = 2 * np.pi / period
+    if system.angles:
+        angles, turning = _places(system.states, system.angles)
+        sizes[list(angles)] = _ANGLE
+        if math.isfinite(period):
+            sizes[list(turning)] = 2 * np.pi * _ANGLE / period
     return Natural(sizes, units)
 
 
@@ -66,7 +76,11 @@ def state_scales(values: Array, natural: Natural = Natural()) -> Array:  # noqa:
 
     A state that is (nearly) zero, compared with the others in their units, takes the largest scale of all, at most 1.
     """
-    size = np.abs(values).max(axis=0)
+    return _scales_of(np.abs(values).max(axis=0), natural)
+
+
+def _scales_of(size: Array, natural: Natural) -> Array:
+    """The same of the largest moduli (n,)."""
     largest = float((size / natural.units).max())
     if not np.isfinite(largest) or largest == 0.0:
         return np.ones(len(size))
@@ -82,14 +96,17 @@ def adapted(
     nodes, stages, rest = mesh.split(u)
     period_scale = float(rest[0]) if mesh.own else 1.0
     period = period_scale if mesh.own else problem.orbit_period(params)
-    scales = state_scales(stages.reshape(-1, mesh.n), natural_sizes(problem.system, period))
-    ratios = np.append(scales / problem.scales, period_scale / problem.period_scale)
-    rescale = bool((ratios > 2).any() or (ratios < 0.5).any())
+    size = np.abs(stages).max(axis=0).reshape(mesh.degree, mesh.n).max(axis=0)
+    natural = natural_sizes(problem.system, period)
+    rescale = not (0.5 <= period_scale / problem.period_scale <= 2.0 and _fit(problem.scales, size, natural))
     if not rescale:
         scales, period_scale = problem.scales, problem.period_scale
-    if not problem.adaptive and not rescale:
-        return None
-    breaks = problem.break_points(params)
+        if not problem.adaptive:
+            return None
+    else:
+        scales = _scales_of(size, natural)
+    known = problem.system.breaks or problem.mirror is not None
+    breaks = problem.break_points(params) if known else np.zeros(0)
     moved = any(np.abs(mesh.edges - b).min() > 1e-12 for b in breaks)
     count, edges = mesh.intervals, mesh.edges
     if problem.adaptive or moved:
@@ -102,7 +119,7 @@ def adapted(
         if moved or count != mesh.intervals or error > _FINE * problem.accuracy:
             rho = monitor(mesh.edges, mesh.leading(nodes, stages) / scales, mesh.degree, breaks)
             share = rho * mesh.h
-            uneven = problem.adaptive and share.max() > _UNEVEN * share.mean()
+            uneven = problem.adaptive and float(share.max()) * len(share) > _UNEVEN * float(share.sum())
             if moved or uneven or count != mesh.intervals:
                 edges = equidistribute(mesh.edges, rho, count, breaks)
     if edges is mesh.edges:
@@ -112,6 +129,20 @@ def adapted(
         return new, mesh.transfer(new.mesh, u)[0], None
     moved_u, moved_t = mesh.transfer(new.mesh, u, tangent.u)
     return new, moved_u, Tangent(moved_t, tangent.parameter, tangent.weight)
+
+
+def _fit(scales: Array, size: Array, natural: Natural) -> bool:
+    """Whether the scales are within a factor of 2 of those that the largest moduli `size` (n,) ask for."""
+    sizes, smallest, units = size.tolist(), np.asarray(natural.smallest).tolist(), np.asarray(natural.units).tolist()
+    largest = max(map(operator.truediv, sizes, units))
+    if not math.isfinite(largest) or largest == 0.0:
+        return bool(((scales <= 2.0) & (scales >= 0.5)).all())
+    top = min(largest, 1.0)
+    for scale, one, least, unit in zip(scales.tolist(), sizes, smallest, units):
+        wanted = max(one, least) if one > _TINY * largest * unit else top * unit
+        if not 0.5 <= wanted / scale <= 2.0:
+            return False
+    return True
 
 
 def _rounding(problem: Collocation, u: Array, params: Array) -> float:
@@ -125,7 +156,7 @@ def _rounding(problem: Collocation, u: Array, params: Array) -> float:
 
 def _wanted_intervals(problem: Collocation, error: float) -> int:
     N = problem.mesh.intervals
-    ratio = min(error / problem.accuracy, 1e12) if np.isfinite(error) else 1e3
+    ratio = min(error / problem.accuracy, 1e12) if math.isfinite(error) else 1e3
     if 1e-5 <= ratio <= 1.0 or (ratio < 1.0 and problem.intervals >= N):
         return N
     factor = float((4.0 * ratio) ** (0.5 / problem.mesh.degree)) if ratio > 0 else 0.0
