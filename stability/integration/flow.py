@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -116,38 +117,36 @@ def flow(
     array([[-1.,  0.],
            [ 0., -1.]])
     """
-    params = system.parameter_vector() if params is None else np.array(params, float)
+    parameters = tuple(parameters)
+    plan = _plan(system, variations, parameters)
+    params = plan.params.copy() if params is None else np.array(params, float)
     x = system.state_vector(x0)
     n, (t0, t1) = len(x), (float(span[0]), float(span[1]))
     if not (math.isfinite(t0) and math.isfinite(t1) and t1 > t0):
         raise InputError(f"span = ({t0:g}, {t1:g}): two ascending finite times are needed")
     scales = np.empty(n)
     scales[:] = atol
-    if not 1e-15 < rtol < 1 or not all(scale > 0 for scale in scales.tolist()):
+    if not 1e-15 < rtol < 1 or not all(map((0.0).__lt__, scales.tolist())):
         raise InputError(f"rtol = {rtol:g} must lie in (1e-15, 1), atol = {atol} must be positive")
-    if system.stops or has_switches(system):
+    compiled = plan.compiled
+    if compiled is None:
         return _over_events(system, (t0, t1), x, params, rtol, atol, variations, parameters, dense, max_steps)
-    compiled = CompiledField.of(system)
-    which = np.array([-1] * (n if variations else 0) + [compiled.place(name) for name in parameters], np.int64)
-    z = np.zeros((n, 1 + len(which)))
+    z = plan.start.copy()
     z[:, 0] = x
-    if variations:
-        z.ravel()[1 :: z.shape[1] + 1] = 1.0  # the diagonal behind the state
     period, slopes, breaks = compiled.timing(params)
-    rates = np.where(which >= 0, slopes[which], 0.0) if len(parameters) else np.zeros(len(which))
-    address = compiled.address if len(parameters) else compiled.evaluations.address("FJ" if variations else "F")
-    steps, kept = 0, []
-    h = 0.0
-    for start, end in pieces(compiled, t0, t1, period, breaks):
+    rates = np.where(plan.which >= 0, slopes[plan.which], 0.0) if parameters else plan.rates
+    steps, kept, h = 0, [], 0.0
+    for start, end in pieces(compiled, t0, t1, period, breaks) if len(breaks) else ((t0, t1),):
         inside = 1e-13 * max(period, abs(end)) if len(breaks) else 0.0
         status, s, h, count, times, coefficients = runge_kutta.integrate(
-            address, params, 1.0, 0.0, 1.0 / period, start, end, z, which, rates, rtol,
-            scales, h, inside, max_steps - steps, int(dense),
+            plan.address, params, 1.0, 0.0, 1.0 / period, start, end, z, plan.which, rates, rtol,
+            scales, h, inside, max_steps - steps, dense,
         )  # fmt: skip
         steps += count
-        kept.append((times, coefficients))
         if status != runge_kutta.DONE:
             raise _failure(system, status, s, z[:, 0], steps)
+        if dense:
+            kept.append((times, coefficients))
     matrix = z[:, 1 : n + 1].copy() if variations else None
     by_parameter = z[:, 1 + (n if variations else 0) :].copy() if parameters else None
     stored = None
@@ -157,6 +156,38 @@ def flow(
             np.concatenate([k[1] for k in kept]),
         )
     return Flow(t1, z[:, 0].copy(), steps, matrix, by_parameter, stored)
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """What all integrations of a system with the same variations have in common.
+
+    params (m,) of the system; which (k,), rates (k,) zeros: see kernels/runge_kutta.py; start (n, 1 + k): a state of
+    zeros and the variations at the start; compiled is None where events have to be looked for.
+    """
+
+    params: Array
+    compiled: CompiledField | None
+    address: int
+    which: Array
+    rates: Array
+    start: Array
+
+
+@lru_cache(maxsize=64)
+def _plan(system: Any, variations: bool, parameters: tuple[str, ...]) -> _Plan:
+    """The plan; nothing in it is written to."""
+    params, n = system.parameter_vector(), system.n
+    if system.stops or has_switches(system):
+        none = np.zeros(0)
+        return _Plan(params, None, 0, none, none, none)
+    compiled = CompiledField.of(system)
+    which = np.array([-1] * (n if variations else 0) + [compiled.place(name) for name in parameters], np.int64)
+    start = np.zeros((n, 1 + len(which)))
+    if variations:
+        start[:, 1 : 1 + n] = np.eye(n)
+    address = compiled.address if parameters else compiled.evaluations.address("FJ" if variations else "F")
+    return _Plan(params, compiled, address, which, np.zeros(len(which)), start)
 
 
 def _over_events(

@@ -20,7 +20,7 @@ from stability.errors import InputError
 from stability.kernels import dop853_coefficients as method
 from stability.kernels.addresses import borrowed, call_field
 from stability.kernels.caching import kernel
-from stability.kernels.vectors import add_four, combine_four, set_four
+from stability.kernels.vectors import combine_four, combine_sixteen, product
 
 __all__ = ["DONE", "NOT_FINITE", "STEP_TOO_SMALL", "TOO_MANY_STEPS", "advance", "integrate", "interpolate"]
 
@@ -28,22 +28,23 @@ DONE, STEP_TOO_SMALL, TOO_MANY_STEPS, NOT_FINITE, NO_ROOM = 0, 1, 2, 3, 4
 _NODES = method.C
 # rows behind the stages: the step, its two errors (the second: what it has beyond the step), the dense output. They are
 # entries of an array because an integer literal as an argument is a type of its own for numba, which compiles the
-# helper once more for it. Lines behind the slopes: state, end of step, its copy, zeros, two errors.
-_BEHIND, _FIRST, _LINES = np.array([16, 17, 18, 19]), np.array([0, 1]), np.arange(16, 22)
+# helper once more for it. Lines behind the slopes and one that these may run over into: state, end of step, its copy,
+# zeros, two errors.
+_BEHIND, _FIRST, _LINES = np.array([16, 17, 18, 19]), np.array([0, 1]), np.arange(17, 23)
 
 
-def _quads() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(stages, weights, number) of the non-zero weights of each row, four at a time; the last four padded by zeros."""
+def _terms() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(stages, weights, number) of the non-zero weights of each row."""
     rows = [*method.A, method.B, method.E5, method.E3 - method.B, *method.D]
-    places, weights, counts = np.zeros((len(rows), 4, 4), np.int64), np.zeros((len(rows), 4, 4)), []
+    places, weights = np.zeros((len(rows), 16), np.int64), np.zeros((len(rows), 16))
     for r, row in enumerate(rows):
         used = np.flatnonzero(row)
-        places[r].flat[: len(used)], weights[r].flat[: len(used)] = used, row[used]
-        counts.append(-(-len(used) // 4))
-    return places, weights, np.array(counts)
+        places[r, : len(used)], weights[r, : len(used)] = used, row[used]
+    return places, weights, np.array([np.count_nonzero(row) for row in rows])
 
 
-_PLACES, _WEIGHTS, _QUADS = _quads()
+_PLACES, _WEIGHTS, _COUNTS = _terms()
+_NO_TIMES, _NO_STEPS = np.empty(0), np.empty((0, 8, 0))  # without dense output; nobody writes into them
 
 
 @kernel(inline=True)
@@ -71,41 +72,33 @@ def _exchange(z, line, inward):  # type: ignore[no-untyped-def]
 @kernel(inline=True)
 def _combine(row, h, start, K, out):  # type: ignore[no-untyped-def]
     """out = start + h sum_i w_i K_i with the weights of a row of the method; out and start are numbers of rows of K."""
-    for q in range(_QUADS[row]):
-        rows = (_PLACES[row, q, 0], _PLACES[row, q, 1], _PLACES[row, q, 2], _PLACES[row, q, 3])
-        a, b, c, d = _WEIGHTS[row, q, 0], _WEIGHTS[row, q, 1], _WEIGHTS[row, q, 2], _WEIGHTS[row, q, 3]
-        weights = (h * a, h * b, h * c, h * d)
-        for e in range(0, K.shape[1], 4):
-            combine_four(K, out, start if q == 0 else out, e, rows, weights)
+    full = K.shape[1] - K.shape[1] % 16
+    for e in range(0, full, 16):
+        combine_sixteen(K, out, start, e, h, _PLACES, _WEIGHTS, row, _COUNTS[row])
+    for e in range(full, K.shape[1], 4):
+        combine_four(K, out, start, e, h, _PLACES, _WEIGHTS, row, _COUNTS[row])
 
 
-@kernel(inline=True)
-def _slope(field, P, sigma, phase, x, V, which, sigma_p, plain, F, J, Fp, K, i):  # type: ignore[no-untyped-def]
-    """K_i = d(x, V)/ds at x (n,), V (n, k); plain: no derivatives by parameters.
+@kernel(inline=True, merged=True)
+def _slope(field, P, sigma, phase, x, V, which, sigma_p, plain, used, F, J, Fp, K, i):  # type: ignore[no-untyped-def]
+    """K_i = d(x, V)/ds at x (n,), V (n, k); plain: no derivatives by parameters; used (n,) is a work place.
 
-    An unsigned index cannot be negative: no wrapping, no gathered loads. F is read last: the processor has written it.
+    An unsigned index cannot be negative: no wrapping, no gathered loads.
     """
     n, count = V.shape
-    phase[0] -= math.floor(phase[0])
+    phase[0] -= np.floor(phase[0])
     call_field(field, 1, phase, x, P, 0, F, J, Fp)
     for a in range(n if count > 0 else 0):
-        at, factor = n + a * count, sigma * J[a, 0]
-        if plain:
-            for k in range(0, count - 3, 4):
-                set_four(K, i, at + k, factor, V, 0, k)
-            for k in range(count - count % 4, count):
-                K[i, np.uint64(at + k)] = factor * V[0, k]
-        else:
+        some = 0
+        for b in range(n):
+            used[np.uint64(some)] = b
+            some += J[a, b] != 0.0
+        product(K, i, n + a * count, sigma, J, a, used, some, V)
+    if not plain:
+        for a in range(n):
             for k in range(count):
-                slope = sigma_p[k] * F[a] + factor * V[0, k]
-                K[i, np.uint64(at + k)] = slope + sigma * Fp[a, which[k]] if which[k] >= 0 else slope
-        for b in range(1, n):
-            factor = sigma * J[a, b]
-            if factor != 0.0:
-                for k in range(0, count - 3, 4):
-                    add_four(K, i, at + k, factor, V, b, k)
-                for k in range(count - count % 4, count):
-                    K[i, np.uint64(at + k)] += factor * V[b, k]
+                slope = sigma_p[k] * F[a]
+                K[i, np.uint64(n + a * count + k)] += slope + sigma * Fp[a, which[k]] if which[k] >= 0 else slope
     for a in range(n):
         K[i, np.uint64(a)] = sigma * F[a]
 
@@ -130,37 +123,35 @@ def _scaled(square, other, count):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _variation_error(five, three, V, x, rtol, atol, weights, P, which):  # type: ignore[no-untyped-def]
-    """Scaled error of the variations V (n, k) at x from their two estimates.
+def _variation_error(K, n, rtol, atol, weights, P, which):  # type: ignore[no-untyped-def]
+    """Scaled error of the variations at the end of a step from their two estimates, the last lines of K.
 
     A variation is held to rtol of its own largest entry, in units of atol (weights: 1 / atol); a derivative by a
     parameter p need not be better than what a relative change of p by one makes of the state's tolerance (where it is
     zero, its rounding is all there is).
     """
-    n, count = V.shape
+    count = which.shape[0]
     square, other = 0.0, 0.0
     for k in range(count):
         size, first, second = 0.0, 0.0, 0.0
-        if which[k] < 0 or P[which[k]] == 0.0:
-            for a in range(n):
-                weight = weights[a]
-                value = abs(V[a, k]) * weight
-                size = value if value > size else size
-                first += (five[a, k] * weight) ** 2
-                second += (three[a, k] * weight) ** 2
-            scale = 1.0 / (rtol * size + 1e-300)
-            square += first * scale * scale
-            other += second * scale * scale
-            continue
+        by_parameter = which[k] >= 0 and P[which[k]] != 0.0
         for a in range(n):
-            value = abs(V[a, k]) / atol[a]
+            at, weight = np.uint64(n + a * count + k), weights[a]
+            value = abs(K[18, at]) * weight
             size = value if value > size else size
-        floor = 1.0 / abs(P[which[k]])
-        for a in range(n):
-            scale, least = floor * (atol[a] + rtol * abs(x[a])), rtol * atol[a] * size + 1e-300
-            scale = scale if scale > least else least
-            square += (five[a, k] / scale) ** 2
-            other += (three[a, k] / scale) ** 2
+            first += (K[21, at] * weight) ** 2
+            second += (K[22, at] * weight) ** 2
+        scale = 1.0 / (rtol * size + 1e-300)
+        if by_parameter:
+            floor, first, second, scale = 1.0 / abs(P[which[k]]), 0.0, 0.0, 1.0
+            for a in range(n):
+                at = np.uint64(n + a * count + k)
+                unit, least = floor * (atol[a] + rtol * abs(K[18, np.uint64(a)])), rtol * atol[a] * size + 1e-300
+                unit = unit if unit > least else least
+                first += (K[21, at] / unit) ** 2
+                second += (K[22, at] / unit) ** 2
+        square += first * scale * scale
+        other += second * scale * scale
     return _scaled(square, other, n * count)
 
 
@@ -192,20 +183,18 @@ def _euler_step(x, K, rtol, atol, span):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _end_of_step(h, line, K, zero, work, new, five, three, V, rtol, atol, weights, P, which):  # type: ignore[no-untyped-def]
-    """Fill work and new with the end of the step (V are the variations in work); returns its scaled error."""
-    n, size = V.shape[0], V.shape[0] * (1 + V.shape[1])
+def _end_of_step(h, K, n, rtol, atol, weights, P, which):  # type: ignore[no-untyped-def]
+    """Fill work and new with the end of the step; returns its scaled error."""
+    line, work, new, five, three = K[17], K[18], K[19], K[21], K[22]
     _combine(_BEHIND[0], h, _LINES[3], K, _LINES[1])
     _combine(_BEHIND[1], h, _LINES[3], K, _LINES[4])
     _combine(_BEHIND[2], h, _LINES[1], K, _LINES[5])
-    for e in range(new.shape[0]):
+    for e in range(K.shape[1]):
         work[e] += line[e]
         new[e] = work[e]
     error = _state_error(five, three, line, new, rtol, atol)
-    if V.shape[1] > 0:
-        other = _variation_error(
-            five[n:size].reshape(V.shape), three[n:size].reshape(V.shape), V, new, rtol, atol, weights, P, which
-        )
+    if which.shape[0] > 0:
+        other = _variation_error(K, n, rtol, atol, weights, P, which)
         error = other if not other <= error else error
     return error
 
@@ -215,33 +204,34 @@ def advance(  # type: ignore[no-untyped-def]
     field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps, dense, steps, times,
     coefficients,
 ):  # fmt: skip
-    """Advance z (n, 1 + k) in place from s to `end` > s: (status, s reached, last h, steps).
+    """Advance z (n, 1 + k) in place from s to `end` > s: (status, s reached, next h, steps).
 
     The field is never evaluated beyond low and high. dense = 1 keeps the steps from number `steps` on in times and
     coefficients, as `integrate` describes, and ends with NO_ROOM when these are full.
     """
     n, m, size = z.shape[0], P.shape[0], z.size
-    flat = (size + 7) // 8 * 8  # filled up with zeros: the processor takes eight at a time
-    rows, field_values = np.zeros((22, flat)), np.empty(1 + n + n * n + n * m + n)
+    flat = (size + 3) // 4 * 4  # filled up with zeros: the processor takes four at a time
+    rows, field_values = np.zeros((23, flat)), np.empty(1 + n + n * n + n * m + n)
+    used = np.empty(n, np.int64)
     found = _advance(
         field, borrowed(P), sigma, phase0, rate, low, high, s, end, borrowed(z), borrowed(which), borrowed(sigma_p),
         rtol, borrowed(atol), h, max_steps, dense, steps, borrowed(times), borrowed(coefficients), borrowed(rows),
-        borrowed(field_values),
+        borrowed(field_values), borrowed(used),
     )  # fmt: skip
-    rows[0, 0], field_values[0] = 0.0, 0.0  # their last use: they are kept until here
+    rows[0, 0], field_values[0], used[0] = 0.0, 0.0, 0  # their last use: they are kept until here
     return found
 
 
 @kernel(inline=True)
 def _advance(  # type: ignore[no-untyped-def]
     field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps, dense, steps, times,
-    coefficients, rows, field_values,
+    coefficients, rows, field_values, used,
 ):  # fmt: skip
-    """`advance` with arrays without owners; rows (22, flat) of zeros, field_values (1 + 2 n + n n + n m)."""
+    """`advance` with arrays without owners; rows (23, flat) of zeros; field_values (1 + 2 n + n n + n m), used (n,)."""
     n, count = z.shape[0], which.shape[0]
     size, flat, squared = n * (1 + count), rows.shape[1], 1 + n + n * n
-    K, lines, phase = rows, rows[16:], field_values[:1]
-    line, work, new, zero, five, three = lines[0], lines[1], lines[2], lines[3], lines[4], lines[5]
+    K, lines, phase = rows, rows[17:], field_values[:1]
+    line, work, new, five = lines[0], lines[1], lines[2], lines[4]
     F, J = field_values[1 : 1 + n], field_values[1 + n : squared].reshape((n, n))
     Fp = field_values[squared : squared + n * P.shape[0]].reshape((n, P.shape[0]))
     V, weights = work[n:size].reshape((n, count)), field_values[squared + n * P.shape[0] :]
@@ -254,60 +244,61 @@ def _advance(  # type: ignore[no-untyped-def]
     _exchange(z, line, _FIRST[1])
     for e in range(flat):
         work[e] = line[e]
-    rejected, status, last = False, TOO_MANY_STEPS, 16 if dense == 1 else 13
-    phase[0] = phase0 + rate * _between(s, low, high)
-    _slope(field, P, sigma, phase, work, V, which, sigma_p, plain, F, J, Fp, K, _FIRST[0])
-    if h <= 0.0:
-        h = _euler_step(line, K, rtol, atol, end - s)
-        for e in range(flat):
-            work[e] = line[e] + h * K[0, e]
-        phase[0] += rate * h
-        _slope(field, P, sigma, phase, work, V, which, sigma_p, plain, F, J, Fp, K, _FIRST[1])
-        h = _between(_first_step(line, K, h, rtol, atol), 0.0, 0.1 * (end - s))
-    for _ in range(max_steps):
-        if dense == 1 and steps == coefficients.shape[0]:
-            status = NO_ROOM
-            break
-        if end - s - h < 1e-3 * h:
-            h = end - s
-        error = 0.0
-        for i in range(1, last):  # stage 12 is the slope at the end of the step, known to be good before it is taken
-            if i != 12:
-                _combine(i, h, _LINES[0], K, _LINES[1])
-            else:
-                error = _end_of_step(h, line, K, zero, work, new, five, three, V, rtol, atol, weights, P, which)
-                if not error < 1.0:
-                    break
-            phase[0] = phase0 + rate * _between(s + _NODES[i] * h, low, high)
-            _slope(field, P, sigma, phase, work, V, which, sigma_p, plain, F, J, Fp, K, i)
-        factor = 0.9 / math.sqrt(math.sqrt(math.sqrt(error))) if error > 0.0 else 6.0
-        if not error < 1.0:
-            h *= _between(factor if error < np.inf else 0.1, 0.1, 1.0)
-            rejected = True
-            if not (h > 1e-14 * abs(s) and h > 1e-14 * abs(end)):
-                status = NOT_FINITE if not error < np.inf else STEP_TOO_SMALL
+    unknown, rejected, finished, status, tried = h <= 0.0, False, False, TOO_MANY_STEPS, 0
+    i, last, error, length = _FIRST[0], 16 if dense == 1 else 13, 0.0, h
+    while tried < max_steps:
+        if i == 1 and not unknown:  # a step begins
+            if dense == 1 and steps == coefficients.shape[0]:
+                status = NO_ROOM
                 break
-            continue
-        if dense == 1:
-            _keep(h, line, new, K, zero, five, coefficients, steps)
-            times[steps + 1] = s + h
-        steps += 1
-        finished = h == end - s
-        s = end if finished else s + h
-        for e in range(flat):
-            line[e] = new[e]
-            K[0, e] = K[12, e]
-        if finished:
-            status = DONE
-            break
-        h *= _between(factor, 0.333, 1.0 if rejected else 6.0)
-        rejected = False
+            length = _fitted(h, end - s)
+            finished = length == end - s
+        if i == 12:  # the slope at the end of the step, known to be good before it is taken
+            error = _end_of_step(length, K, n, rtol, atol, weights, P, which)
+            factor = 0.9 / math.sqrt(math.sqrt(math.sqrt(error))) if error > 0.0 else 6.0
+            if not error < 1.0:
+                h = length * _between(factor if error < np.inf else 0.1, 0.1, 1.0)
+                rejected, i, tried = True, _FIRST[1], tried + 1
+                if not (h > 1e-14 * abs(s) and h > 1e-14 * abs(end)):
+                    status = NOT_FINITE if not error < np.inf else STEP_TOO_SMALL
+                    break
+                continue
+        elif i > 0:
+            _combine(i, length, _LINES[0], K, _LINES[1])
+        phase[0] = phase0 + rate * _between(s + _NODES[i] * length, low, high)
+        _slope(field, P, sigma, phase, work, V, which, sigma_p, plain, used, F, J, Fp, K, i)
+        i += 1
+        if unknown and i == 1:
+            length = _euler_step(line, K, rtol, atol, end - s) / _NODES[1]
+        elif unknown:
+            h = _between(_first_step(line, K, _NODES[1] * length, rtol, atol), 0.0, 0.1 * (end - s))
+            unknown, i = False, _FIRST[1]
+        elif i == last:
+            if dense == 1:
+                _keep(length, line, new, K, five, coefficients, steps)
+                times[steps + 1] = s + length
+            steps, tried, i = steps + 1, tried + 1, _FIRST[1]
+            s = end if finished else s + length
+            for e in range(flat):
+                line[e] = new[e]
+                K[0, e] = K[12, e]
+            h = length * _between(factor, 0.333, 1.0 if rejected else 6.0)
+            rejected = False
+            if finished:
+                status = DONE
+                break
     _exchange(z, line, _FIRST[0])
     return status, s, h, steps
 
 
 @kernel(inline=True)
-def _keep(h, z, new, K, zero, work, coefficients, q):  # type: ignore[no-untyped-def]
+def _fitted(h, rest):  # type: ignore[no-untyped-def]
+    """The step h, or what is left, in one step or in two equal ones."""
+    return rest if rest < 1.001 * h else 0.5 * rest if rest < 2.0 * h else h
+
+
+@kernel(inline=True)
+def _keep(h, z, new, K, work, coefficients, q):  # type: ignore[no-untyped-def]
     """The eight coefficients of the dense output of step q."""
     for a in range(coefficients.shape[2]):
         change = new[a] - z[a]
@@ -330,23 +321,29 @@ def integrate(
 
     which (k,) int: parameter index of a variation, -1 for none; sigma_p (k,). h: first step, 0 for an automatic one.
     The field is never evaluated closer than `inside` to the two ends: they may be jumps of the field in time.
-    dense = 1 keeps the steps. Returns (status, s reached, last h, steps, times (steps + 1,), coefficients
-    (steps, 8, n)): on a step x(s + theta h) is built from the eight coefficients by `interpolate`.
+    dense = 1 keeps the steps. Returns (status, s reached, next h, steps, times (steps + 1,), coefficients
+    (steps, 8, n); both empty without): on a step x(s + theta h) is built from the eight coefficients by `interpolate`.
     """
     if not z.flags.c_contiguous:
         raise InputError("z must be C-contiguous: it is advanced in place")
-    n, low, high, room = len(z), s + inside, end - inside, 64 * dense
-    times, coefficients = np.empty(room + 1), np.empty((room, 8, n))
+    low, high = s + inside, end - inside
+    if not dense:
+        status, s, h, steps = advance(
+            field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps, 0, 0,
+            _NO_TIMES, _NO_STEPS,
+        )  # fmt: skip
+        return status, s, h, steps, _NO_TIMES, _NO_STEPS
+    times, coefficients = np.empty(65), np.empty((64, 8, len(z)))
     times[0] = s
     steps, status = 0, NO_ROOM
     while status == NO_ROOM:
-        if dense and steps == len(coefficients):
-            times, coefficients = np.resize(times, 2 * steps + 1), np.resize(coefficients, (2 * steps, 8, n))
+        if steps == len(coefficients):
+            times, coefficients = np.resize(times, 2 * steps + 1), np.resize(coefficients, (2 * steps, 8, len(z)))
         status, s, h, steps = advance(
-            field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps - steps,
-            dense, steps, times, coefficients,
+            field, P, sigma, phase0, rate, low, high, s, end, z, which, sigma_p, rtol, atol, h, max_steps - steps, 1,
+            steps, times, coefficients,
         )  # fmt: skip
-    return status, s, h, steps, times[: steps * dense + 1], coefficients[: steps * dense]
+    return status, s, h, steps, times[: steps + 1], coefficients[:steps]
 
 
 @kernel

@@ -1,17 +1,18 @@
 """Sums of rows, four neighbouring entries at a time.
 
 numba turns loops over arrays into vector instructions only behind tests that no two of the arrays overlap, which cost
-more than the few entries of a small system's state. Here all operands are read before the result is written:
+more than the few entries of a small system's state. Here a sum stays in a register until it is complete:
 
-    K[out, e : e + 4] = K[start, e : e + 4] + sum_j w_j K[rows_j, e : e + 4]
-    out[i, e : e + 4] = factor V[b, k : k + 4],    out[i, e : e + 4] += factor V[b, k : k + 4]
+    K[out, e : e + 4] = K[start, e : e + 4] + h sum_{j < count} weights[r, j] K[places[r, j], e : e + 4]   (or 16)
+    K[i, start : start + c] = factor sum_{j < count} J[a, used[j]] V[used[j], 0 : c]
 
-Arrays are float64 and C-contiguous; the caller sees to it that the entries exist. Four is what was written by the last
-such sum: a processor hands on an entry that is still being written only to a read that fits into what was written.
+Arrays are float64 (places int64) and C-contiguous; the caller sees to it that the entries exist. Four at a time, as
+they are written: a processor hands on what is still being written only to a read that lies within one write.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
@@ -19,18 +20,28 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-__all__ = ["add_four", "combine_four", "set_four"]
+__all__ = ["combine_four", "combine_sixteen", "product"]
 
+_INTEGER = ir.IntType(64)
 _FOUR = ir.VectorType(ir.DoubleType(), 4)
 _FUSED = ("contract",)  # a product and a sum may be one instruction where the processor has it
 
 
-def _place(context: Any, builder: Any, array_type: Any, value: Any, at: list[Any]) -> Any:
-    """Pointer to four entries from place `at` = [row, column] of an array."""
-    array = context.make_array(array_type)(context, builder, value=value)
-    columns = cgutils.unpack_tuple(builder, array.shape, 2)[1]
-    place = builder.add(builder.mul(at[0], columns), at[1])
-    return builder.bitcast(builder.gep(array.data, [place]), _FOUR.as_pointer())
+class _Rows:
+    """A two-dimensional array of a kernel."""
+
+    def __init__(self, context: Any, builder: Any, array_type: Any, value: Any) -> None:
+        array = context.make_array(array_type)(context, builder, value=value)
+        self.builder, self.data = builder, array.data
+        self.height, self.width = cgutils.unpack_tuple(builder, array.shape, 2)
+
+    def entry(self, row: Any, column: Any) -> Any:
+        """Pointer to an entry."""
+        return self.builder.gep(self.data, [self.builder.add(self.builder.mul(row, self.width), column)])
+
+    def four(self, row: Any, column: Any) -> Any:
+        """Pointer to four of them."""
+        return self.builder.bitcast(self.entry(row, column), _FOUR.as_pointer())
 
 
 def _all(builder: Any, number: Any) -> Any:
@@ -40,55 +51,70 @@ def _all(builder: Any, number: Any) -> Any:
     return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(integer, 4), [0] * 4))
 
 
-def _sum(builder: Any, total: Any, weight: Any, row: Any) -> Any:
-    """total + weight row."""
-    return builder.fadd(total, builder.fmul(_all(builder, weight), row, flags=_FUSED), flags=_FUSED)
+def _sums(builder: Any, count: Any, blocks: int, term: Callable[[Any], tuple[Any, list[Any]]]) -> list[Any]:
+    """sum_{j < count} weight_j row_j, some blocks of four, with term(j) = pointers to the weight and to the blocks."""
+    totals = [cgutils.alloca_once_value(builder, ir.Constant(_FOUR, [0.0] * 4)) for _ in range(blocks)]
+    with cgutils.for_range(builder, count, intp=_INTEGER) as loop:
+        weight, rows = term(loop.index)
+        weight = _all(builder, builder.load(weight))
+        for row, total in zip(rows, totals):
+            product = builder.fmul(weight, builder.load(row, align=8), flags=_FUSED)
+            builder.store(builder.fadd(builder.load(total), product, flags=_FUSED), total)
+    return [builder.load(total) for total in totals]
+
+
+def _combination(blocks: int) -> Any:
+    @intrinsic
+    def combination(typingctx, K, out, start, e, h, places, weights, r, count):  # type: ignore[no-untyped-def]
+        """K[out, e :] = K[start, e :] + h sum_{j < count} weights[r, j] K[places[r, j], e :], some blocks of four."""
+        integer = types.int64
+        signature = types.void(K, integer, integer, integer, types.float64, places, weights, integer, integer)
+
+        def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
+            _, out, start, e, h, _, _, r, count = args
+            rows, where, what = (_Rows(context, builder, sig.args[k], args[k]) for k in (0, 5, 6))
+            at = [builder.add(e, ir.Constant(_INTEGER, 4 * k)) for k in range(blocks)]
+
+            def term(j: Any) -> tuple[Any, list[Any]]:
+                row = builder.load(where.entry(r, j))
+                return what.entry(r, j), [rows.four(row, place) for place in at]
+
+            for place, total in zip(at, _sums(builder, count, blocks, term)):
+                step = builder.fmul(_all(builder, h), total, flags=_FUSED)
+                ending = builder.fadd(builder.load(rows.four(start, place), align=8), step, flags=_FUSED)
+                builder.store(ending, rows.four(out, place), align=8)
+            return context.get_dummy_value()
+
+        return signature, codegen
+
+    return combination
+
+
+combine_four, combine_sixteen = _combination(1), _combination(4)
 
 
 @intrinsic
-def combine_four(typingctx, K, out, start, e, rows, weights):  # type: ignore[no-untyped-def]
-    """``K[out, e : e + 4] = K[start, e : e + 4] + sum_j weights[j] K[rows[j], e : e + 4]``, for tuples of j."""
-    integer, count = types.int64, len(rows)
-    tuples = types.UniTuple(integer, count), types.UniTuple(types.float64, count)
-    signature = types.void(K, integer, integer, integer, *tuples)
+def product(typingctx, K, i, start, factor, J, a, used, count, V):  # type: ignore[no-untyped-def]
+    """``K[i, start : start + c] = factor sum_{j < count} J[a, used[j]] V[used[j]]`` for V (n, c).
+
+    Up to three entries behind these are overwritten, too.
+    """
+    integer = types.int64
+    signature = types.void(K, integer, integer, types.float64, J, integer, used, integer, V)
 
     def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        def four(row: Any) -> Any:
-            return _place(context, builder, sig.args[0], args[0], [row, args[3]])
+        _, i, start, factor, _, a, _, count, _ = args
+        rows, J, V = (_Rows(context, builder, sig.args[k], args[k]) for k in (0, 4, 8))
+        used = context.make_array(sig.args[6])(context, builder, value=args[6]).data
+        zero, step = ir.Constant(_INTEGER, 0), ir.Constant(_INTEGER, 4)
+        with cgutils.for_range_slice(builder, zero, V.width, step, intp=_INTEGER) as (k, _):
 
-        places, factors = (cgutils.unpack_tuple(builder, args[k], count) for k in (4, 5))
-        total = builder.load(four(args[2]), align=8)
-        for row, factor in zip(places, factors):
-            total = _sum(builder, total, factor, builder.load(four(row), align=8))
-        builder.store(total, four(args[1]), align=8)
-        return context.get_dummy_value()
+            def term(j: Any) -> tuple[Any, Any]:
+                b = builder.load(builder.gep(used, [j]))
+                return J.entry(a, b), [V.four(b, k)]
 
-    return signature, codegen
-
-
-@intrinsic
-def add_four(typingctx, out, i, e, factor, V, b, k):  # type: ignore[no-untyped-def]
-    """``out[i, e : e + 4] += factor V[b, k : k + 4]``."""
-    signature = types.void(out, types.int64, types.int64, types.float64, V, types.int64, types.int64)
-
-    def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        place = _place(context, builder, sig.args[0], args[0], args[1:3])
-        entries = builder.load(_place(context, builder, sig.args[4], args[4], args[5:7]), align=8)
-        builder.store(_sum(builder, builder.load(place, align=8), args[3], entries), place, align=8)
-        return context.get_dummy_value()
-
-    return signature, codegen
-
-
-@intrinsic
-def set_four(typingctx, out, i, e, factor, V, b, k):  # type: ignore[no-untyped-def]
-    """``out[i, e : e + 4] = factor V[b, k : k + 4]``."""
-    signature = types.void(out, types.int64, types.int64, types.float64, V, types.int64, types.int64)
-
-    def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
-        entries = builder.load(_place(context, builder, sig.args[4], args[4], args[5:7]), align=8)
-        product = builder.fmul(_all(builder, args[3]), entries)
-        builder.store(product, _place(context, builder, sig.args[0], args[0], args[1:3]), align=8)
+            result = builder.fmul(_all(builder, factor), _sums(builder, count, 1, term)[0])
+            builder.store(result, rows.four(i, builder.add(start, k)), align=8)
         return context.get_dummy_value()
 
     return signature, codegen

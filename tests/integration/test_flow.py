@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm, expm_frechet
 
 import stability as st
 from stability.errors import ConvergenceError, InputError, NonFiniteError, UnknownNameError
@@ -68,6 +69,40 @@ def test_dense_output_against_scipy():
     assert mine(3.0).shape == (2,)
     with pytest.raises(InputError, match="dense"):
         flow(system, (0.0, 1.0), x0)(0.5)
+
+
+@pytest.mark.parametrize("n, parameters", [(1, ()), (2, ("k",)), (3, ()), (5, ("k",)), (7, ("k", "c"))])
+def test_linear_systems_of_every_width_against_the_exponential(n, parameters):
+    """x' = (k A + c B) x with zeros in A: matrix = exp(t (k A + c B)), its derivatives by Frechet's; dense output, too.
+
+    The kernel sums four entries at a time, so every remainder of n (1 + columns) by four has to be right.
+    """
+    values = np.random.default_rng(n)
+    A = np.where(values.random((n, n)) < 0.5, values.standard_normal((n, n)), 0.0)
+    B = values.standard_normal((n, n))
+    k, c = sp.symbols("k c", real=True)
+    names = tuple(f"x{a}" for a in range(n))
+    rhs = sp.Matrix(k * sp.Matrix(A) + c * sp.Matrix(B)) * sp.Matrix(sp.symbols(names, real=True))
+    system = st.System("linear", names, names, {"k": 0.7, "c": 0.4}, tuple(rhs))
+    x0, M = values.standard_normal(n), 0.7 * A + 0.4 * B
+    end = flow(system, (0.0, 1.5), x0, rtol=1e-12, atol=1e-13, variations=True, parameters=parameters, dense=True)
+    matrix = expm(1.5 * M)
+    size = np.abs(matrix).max()
+    assert np.abs(end.matrix - matrix).max() < 1e-10 * size
+    assert np.abs(end.x - matrix @ x0).max() < 1e-10 * size * np.abs(x0).max()
+    assert np.abs(end(0.9) - expm(0.9 * M) @ x0).max() < 1e-8 * size
+    for column, name in enumerate(parameters):
+        wanted = expm_frechet(1.5 * M, 1.5 * {"k": A, "c": B}[name], compute_expm=False) @ x0
+        assert np.abs(end.by_parameter[:, column] - wanted).max() < 1e-9 * np.abs(wanted).max()
+
+
+def test_the_last_steps_are_of_one_length():
+    """What is left of an interval is no sliver: on q'' + q = 0, where all steps have one length, neither has the last."""
+    system = st.System.from_equations({u.diff(t, 2): -u}, coordinates=[u], parameters={})
+    for end in np.linspace(20.0, 24.0, 9):
+        steps = np.diff(flow(system, (0.0, float(end)), dict(u=1.0), rtol=1e-9, atol=1e-11, dense=True).times)
+        assert steps[-1] > 0.45 * np.median(steps)
+        assert steps[4:].max() < 1.2 * np.median(steps)
 
 
 def test_derivatives_against_differences():
