@@ -117,13 +117,17 @@ def multiplier_error(
 ) -> float:
     """Change of the multipliers near the unit circle from degree m to m + 1.
 
-    Where no multiplier is near the circle, the change at an earlier point of the same mesh is carried over, times
-    3 and the square of the growth of the m-th derivative (up to 2): nodes have twice the order of the polynomial.
+    Where none is near the circle, but for those that are critical by construction, the change at an earlier point of
+    the same mesh is carried over, times 3 and the square of the growth of the m-th derivative (up to 2): nodes have
+    twice the order of the polynomial.
     """
     solution, roughness = linearisation.solution, linearisation.summary[2]
     problem._memo["roughness"] = solution, roughness
     carried, _ = carried_errors(problem, solution, roughness)
-    if min((abs(abs(z) - 1) for z in values.tolist()), default=1.0) > 1e3 * carried + 1e-5:
+    free = values.tolist()
+    for target in linearisation.critical[: len(free)]:
+        free.remove(min(free, key=lambda z: abs(z - target)))
+    if min((abs(abs(z) - 1) for z in free), default=1.0) > 1e3 * carried + 1e-5:
         return carried
     step = refined(problem, solution, linearisation.solution_params)
     if step is None:

@@ -10,7 +10,7 @@ starts at v) and one backward sweep (omega, from w): the stage residual is R = W
 
     dg = sum h omega^T d( sigma f_z (V, lambda) + (span tau + sigma_lambda lambda) f ),
 
-which needs the gradient of omega^T f_z (V, lambda) over z at the stages only (`Evaluator.second_gradient`).
+which needs the gradient of omega^T f_z (V, lambda) over z at the stages only (kernels/condensation_sweeps.py).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import numpy as np
 
 from ..kernels.condensation import condense, solve_stages
 from ..kernels.condensation_reduced import reduce_and_solve, summary
-from ..kernels.condensation_sweeps import adjoint_sweep, forward_sweep
+from ..kernels.condensation_sweeps import forward_sweep, gradient, sweeps
 from .orbit_mesh import OrbitMesh
 
 if TYPE_CHECKING:
@@ -67,7 +67,8 @@ class CollocationLinearisation:
     """F, F_u and spectral data at (u, p); see `protocols.Linearisation`. `sign` = 0: a singular interval.
 
     A Newton solve leaves the linearisation of its last iterate: `correction` = (change of u, change of the parameter,
-    its index) leads from there to the solution `solution`, `solution_params`.
+    its index) leads from there to the solution `solution`, `solution_params`. `critical` are multipliers that it has by
+    construction (a point of a curve of special points): nothing depends on how exactly they are known.
     """
 
     problem: Collocation
@@ -76,6 +77,7 @@ class CollocationLinearisation:
     work: Workspace
     sign: float
     correction: tuple[Array, float, int] | None = None
+    critical: tuple[complex, ...] = ()
 
     @cached_property
     def u(self) -> Array:
@@ -156,7 +158,8 @@ class CollocationLinearisation:
         return out
 
     # ------------------------------------------------------------------ solving
-    def _factors(self) -> tuple[Any, ...]:
+    def factors(self) -> tuple[Any, ...]:
+        """A, h, sigma, J, kept, position, LU, pivots: what the kernels need to solve stage equations."""
         mesh, problem = self.mesh, self.problem
         LU, pivots = self._eliminated
         return mesh.rule.matrix, mesh.h, self.sigma, self.work.J, problem.kept, problem.position, LU, pivots
@@ -199,7 +202,7 @@ class CollocationLinearisation:
         out = np.full((mesh.size + q, sides), np.nan)
         if self.sign == 0.0 or not np.isfinite(body).all():
             return out
-        solve_stages(*self._factors(), X)
+        solve_stages(*self.factors(), X)
         x = np.empty((sides, mesh.size + q))
         sign = reduce_and_solve(
             mesh.rule.update, self.work.Z, self.work.M, X, nodes, all_rows, node_rows, corners, problem.closure, 0, x
@@ -230,19 +233,28 @@ class CollocationLinearisation:
         """M = D^-1 S^-1 Phi D."""
         return self.problem.spectral_of(self.summary[0])
 
-    def _variation(self, start: Array, tau: float, free: int, amount: float) -> tuple[Array, Array]:
-        """Nodes (N + 1, n), stages (N, mn) of the variation with dx(0) = start, dT = tau, dp_free = amount."""
-        mesh = self.mesh
-        X = np.zeros((mesh.intervals, mesh.degree * mesh.n, 1))
+    def _forcing(self, tau: float, free: int, amount: float) -> Array:
+        """(N, mn, 1): the stage columns of a variation with dT = tau, dp_free = amount."""
+        X = np.zeros((self.mesh.intervals, self.mesh.degree * self.mesh.n, 1))
         if tau != 0.0:
             X[:, :, 0] -= tau * self._stage_column(-1)
         if amount != 0.0:
             X[:, :, 0] -= amount * self._stage_column(free)
-        if tau != 0.0 or amount != 0.0:
-            solve_stages(*self._factors(), X)
-        none = np.zeros((mesh.intervals, mesh.n, 1))
-        du, dY = forward_sweep(mesh.rule.update, self.work.Z, X, none, np.ascontiguousarray(start[:, None], float))
-        return du[0], dY[0]
+        return X
+
+    def variation(self, start: Array, forcing: Array | None = None) -> tuple[Array, Array]:
+        """Nodes (N + 1, n), stages (N, mn) of the variation with dx(0) = start (n,) and the stage columns `forcing`."""
+        mesh = self.mesh
+        forced, X = (0, self._forcing(0.0, 0, 0.0)) if forcing is None else (1, forcing)
+        nodes, stages = np.empty((mesh.intervals + 1, mesh.n)), np.empty((mesh.intervals, mesh.degree * mesh.n))
+        start = np.ascontiguousarray(start, dtype=float)
+        forward_sweep(*self.factors(), mesh.rule.update, self.work.Z, forced, X, start, nodes, stages)
+        return nodes, stages
+
+    def _variation(self, start: Array, tau: float, free: int, amount: float) -> tuple[Array, Array]:
+        """The variation with dx(0) = start, dT = tau, dp_free = amount."""
+        moved = tau != 0.0 or amount != 0.0
+        return self.variation(start, self._forcing(tau, free, amount) if moved else None)
 
     def _end(self, nodes: Array, stages: Array) -> Array:
         """The core equations of a variation that satisfies the inner ones: (k,)."""
@@ -316,38 +328,25 @@ class CollocationLinearisation:
 
     def _gradient(self, w: Array, v: Array, free: int) -> tuple[Array, Array]:
         problem, mesh, work = self.problem, self.mesh, self.work
-        n, m, own = mesh.n, len(self.params), mesh.own
-        N, count, D = mesh.intervals, mesh.intervals * mesh.degree, problem.scales
-        tau, amount = (float(v[n]) * self.period if own else 0.0), float(v[-1])
-        _, V = self._variation(D * v[:n], tau, free, amount)
+        n, m, own, D = mesh.n, len(self.params), mesh.own, problem.scales
+        relative, amount = (float(v[n]) if own else 0.0), float(v[-1])
+        tau = relative * self.period
+        X = self._forcing(tau, free, amount)
+        if tau != 0.0 or amount != 0.0:
+            solve_stages(*self.factors(), X)
         eta = problem.closure.T @ (w[:n] / D)
-        rho = self.phase_row * float(w[n]) if own else np.zeros((N, mesh.degree * n))
-        A, h, sigma, J, kept, position, LU, pivots = self._factors()
-        omega = adjoint_sweep(
-            A, mesh.rule.row_sums, mesh.rule.update, h, sigma, J, kept, position, LU, pivots, rho, eta
-        )
-        weighted = (omega * mesh.h[:, None]).reshape(count, n)
-        V = V.reshape(count, n)
-        direction = np.zeros((count, n + m))
-        direction[:, :n], direction[:, n + free] = V, amount
-        states = np.ascontiguousarray(mesh.split(self.u)[1].reshape(count, n))
-        # sizes of the variables, so that second derivatives by differences are well scaled
-        sizes = np.concatenate([D, np.maximum(np.abs(self.params), 1e-3)])
-        second = problem.evaluations.second_gradient(mesh.phase, states, self.params, direction, weighted, sizes)
-        along = (J @ V[:, :, None])[:, :, 0]
-        g_state, g_params = sigma * second[:, :n], sigma * second[:, n:].sum(axis=0)
-        if amount != 0.0:
-            along += amount * work.Fp[:, :, free]
-        stretch = mesh.span * (tau + work.dT[free] * amount)
-        if stretch != 0.0:
-            g_state += stretch * np.einsum("cij,ci->cj", J, weighted)
-            g_params += stretch * np.einsum("cim,ci->m", work.Fp, weighted)
-        change = float(np.vdot(along, weighted))
-        g_params += mesh.span * work.dT * change
-        if not own and amount != 0.0:
-            g_params += mesh.span * amount * problem.flow.period_second(self.params, free) * (work.F * weighted).sum()
-        rest = mesh.span * change if own else 0.0
-        if own:
-            # tau = T v_n: the core unknown is relative, so that T itself appears once more
-            rest += float(v[n]) * mesh.span * (work.F * weighted).sum()
-        return mesh.join(np.zeros((N + 1, n)), g_state, rest), g_params
+        rho = self.phase_row * float(w[n]) if own else np.zeros((mesh.intervals, mesh.degree * n))
+        bend = np.zeros(m) if own or amount == 0.0 else amount * problem.flow.period_second(self.params, free)
+        by_stages, by_params = np.empty((mesh.intervals, mesh.degree * n)), np.empty(m)
+        rest = gradient(
+            sweeps(), problem.evaluations.directional_address("second_gradient"), *self.factors(), mesh.rule.update,
+            mesh.rule.row_sums, work.Z, X, D * v[:n], rho, eta, mesh.span, tau, relative, amount, free, bend, work.F,
+            work.Fp, work.dT, mesh.phase, np.ascontiguousarray(mesh.split(self.u)[1]), self.params, self.sizes,
+            by_stages, by_params,
+        )  # fmt: skip
+        return mesh.join(np.zeros((mesh.intervals + 1, n)), by_stages, rest), by_params
+
+    @property
+    def sizes(self) -> Array:
+        """(n + m,) of states and parameters, so that second derivatives by differences are well scaled."""
+        return np.concatenate([self.problem.scales, np.maximum(np.abs(self.params), 1e-3)])

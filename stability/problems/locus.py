@@ -14,6 +14,7 @@ References: Kuznetsov (2004), 10.3; Govaerts (2000), chapter 4.
 
 from __future__ import annotations
 
+import cmath
 import dataclasses
 import math
 from collections.abc import Mapping
@@ -72,6 +73,13 @@ class Locus:
     def extras(self) -> int:
         """Number of extra unknowns."""
         return 1 if self.kind in _PAIRS or self.kind is Kind.BRANCH_POINT else 0
+
+    @cached_property
+    def condensed(self) -> bool:
+        """Whether a Newton solve is one compiled call (`locus_collocation`)."""
+        from .locus_collocation import serves
+
+        return serves(self)
 
     @cached_property
     def _place(self) -> int:
@@ -274,19 +282,21 @@ class Locus:
 
     def others(self, values: NDArray[np.complex128], extra: Array) -> NDArray[np.complex128]:
         """The values without the critical ones."""
+        rest = list(values.tolist())
+        for target in self.targets(extra)[: len(rest)]:
+            rest.remove(min(rest, key=lambda v: abs(v - target)))
+        return np.array(rest, dtype=complex)
+
+    def targets(self, extra: Array) -> list[complex]:
+        """The critical values."""
         critical = self.inner.critical
         if self.kind in _PAIRS:
             e = float(extra[0])
-            upper = e + 1j * np.sqrt(complex(1 - e * e)) if critical.circle else 1j * np.sqrt(complex(e))
-            targets = [upper, upper.conjugate() if np.imag(upper) else 1 / upper if critical.circle else -upper]
-        elif self.kind is Kind.PERIOD_DOUBLING:
-            targets = [complex(critical.minus or -1.0)]
-        else:
-            targets = [1.0 + 0j if critical.circle else 0j]
-        rest = list(values.tolist())
-        for target in targets[: len(rest)]:
-            rest.pop(int(np.argmin([abs(v - target) for v in rest])))
-        return np.array(rest, dtype=complex)
+            upper = complex(e, 0.0) + 1j * cmath.sqrt(1 - e * e) if critical.circle else 1j * cmath.sqrt(e)
+            return [upper, upper.conjugate() if upper.imag else 1 / upper if critical.circle else -upper]
+        if self.kind is Kind.PERIOD_DOUBLING:
+            return [complex(critical.minus or -1.0)]
+        return [1.0 + 0j if critical.circle else 0j]
 
     def _settled(self, u: Array, params: Array) -> Array:
         """Inner u at a fold, corrected along its null vector: the inner problem then knows it, for its error there."""

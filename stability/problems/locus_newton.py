@@ -86,6 +86,8 @@ def corrected(
     curve: Locus, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
 ) -> Corrected:
     """`Problem.correct` of a `Locus`."""
+    if curve.condensed:
+        return _compiled(curve, u, params, free, tangent, ds, tolerance)
     at, last = _Newton(curve, u, params, free, tangent, ds), math.inf
     iteration = 0
     L: ExtendedLinearisation | None = None
@@ -119,6 +121,22 @@ def corrected(
         except np.linalg.LinAlgError:
             return failed(at.u, at.params, iteration, "singular")
     return failed(at.u, at.params, iteration, "no convergence")
+
+
+def _compiled(
+    curve: Locus, u: Array, params: Array, free: str, tangent: Tangent | None, ds: float, tolerance: float
+) -> Corrected:
+    from .locus_collocation import compiled
+
+    limits = (_NEAR, _STALLED, _MAX_NEWTON)
+    found, others, sharp = compiled(curve, u, params, free, tangent, ds, tolerance, limits)
+    L = found.linearisation
+    if not found.converged:
+        return found
+    curve.remember("inner", found.u, L)
+    curve.remember("response", found.u, others[:, 1])
+    curve.remember("sharp", found.u, sharp)
+    return found._replace(tangent=_unit(curve, others[:, 2], tangent), linearisation=None)
 
 
 def _succeeded(at: _Newton, others: Array, iterations: int, sharp: bool) -> Corrected:

@@ -27,8 +27,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.condensation import solve_stages
-from ..kernels.condensation_sweeps import adjoint_sweep, forward_sweep
+from ..kernels.condensation_sweeps import adjoint_sweep
 
 __all__ = ["MapForms"]
 
@@ -42,7 +41,6 @@ class MapForms:
         mesh, problem = L.mesh, L.problem
         self.L, self.n, self.own = L, mesh.n, mesh.own
         self.scales = np.asarray(problem.scales)
-        self.factors = L._factors()
         self.states = np.ascontiguousarray(mesh.split(L.u)[1].reshape(-1, self.n))
         self.matrix, self.sizes, self.basis = np.asarray(L.spectral), self.scales, np.eye(self.n)
         if self.own:
@@ -69,15 +67,11 @@ class MapForms:
     def _sweep(self, start: Array, forcing: Array | None) -> tuple[Array, Array]:
         """(end (n,), stages (count, n)) of the variation from `start` with f's inhomogeneity `forcing` (count, n)."""
         L, mesh = self.L, self.L.mesh
-        X = np.zeros((mesh.intervals, mesh.degree * self.n, 1))
+        columns = None
         if forcing is not None:
-            X[:, :, 0] = L.sigma * mesh.h[:, None] * forcing.reshape(mesh.intervals, -1)
-            solve_stages(*self.factors, X)
-        none = np.zeros((mesh.intervals, self.n, 1))
-        nodes, stages = forward_sweep(
-            mesh.rule.update, L.work.Z, X, none, np.ascontiguousarray(start[:, None], dtype=float)
-        )
-        return nodes[0, -1], stages[0].reshape(-1, self.n)
+            columns = (L.sigma * mesh.h[:, None] * forcing.reshape(mesh.intervals, -1))[:, :, None]
+        nodes, stages = L.variation(start, columns)
+        return nodes[-1], stages.reshape(-1, self.n)
 
     def _returned(self, end: Array) -> Array:
         return np.asarray(np.linalg.solve(self.L.problem.closure, end) / self.scales)
@@ -138,10 +132,9 @@ class MapForms:
         h = np.linalg.solve(np.eye(self.n) - self.matrix, self._returned(end))
         _, H = self._sweep(self.scales * h, None)
         eta = np.linalg.solve(L.problem.closure.T, p / self.scales)
-        omega = adjoint_sweep(
-            self.factors[0], mesh.rule.row_sums, mesh.rule.update, *self.factors[1:],
-            np.zeros((mesh.intervals, mesh.degree * self.n)), eta,
-        )  # fmt: skip
+        none = np.zeros((mesh.intervals, mesh.degree * self.n))
+        omega = np.empty_like(none)
+        adjoint_sweep(*L.factors(), mesh.rule.update, mesh.rule.row_sums, none, eta, omega)
         weighted = L.sigma * (omega * mesh.h[:, None]).reshape(-1, self.n)
         cubic = self._derivative(V, V, V) + 3 * self._derivative(V, W)
         return float((weighted * cubic).sum()) / 6, float((weighted * self._derivative(V, H)).sum()) / 2

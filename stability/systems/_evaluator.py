@@ -29,6 +29,7 @@ __all__ = ["Evaluator"]
 
 Array = np.ndarray
 ADDRESSES = ("F", "FJ", "FJP")
+DIRECTIONS = {"second": 2, "third": 3, "second_gradient": 2}  # direction arrays of each
 FLOAT = np.dtype(np.float64)
 
 
@@ -199,6 +200,20 @@ class Evaluator:
                 self._callbacks[which] = self._native(which)
             return int(self._callbacks[which][0])
 
+    def directional_address(self, which: str) -> int:
+        """Address of the C function of "second", "third" or "second_gradient"; valid as long as this evaluator lives.
+
+        ``void f(int64 N, const double *phase, const double *X, const double *P, int64 pstride, const double *D1, ..,
+        double *out, const double *sizes, void *unused)`` with the directions as in the method of that name (in the
+        order of its arguments); `sizes` (n+m,), which "second_gradient" alone reads, may be null for the others.
+        """
+        if which not in DIRECTIONS:
+            raise InputError(f"address of 'second', 'third' or 'second_gradient', not {which!r}")
+        with self._lock:
+            if which not in self._callbacks:
+                self._callbacks[which] = self._native_directional(which)
+            return int(self._callbacks[which][0])
+
     def failure(self, keep: bool = False) -> str:
         """What a Python function behind `address` raised last, as the end of a sentence; told once unless kept.
 
@@ -229,6 +244,29 @@ class Evaluator:
                 self.callback_error = error.__cause__ if known else error
                 for output in outputs:
                     output[:] = np.nan
+
+        function = ctypes.CFUNCTYPE(None, *kinds)(callback)
+        return int(ctypes.cast(function, ctypes.c_void_p).value or 0), function
+
+    def _native_directional(self, which: str) -> tuple[int, Any]:
+        """As `_native`, around the method of that name."""
+        n, z = self.n, self.n + self.m
+        gradient = which == "second_gradient"
+        widths = (z, n) if gradient else (z,) * DIRECTIONS[which]
+        kinds = [ctypes.c_int64] + [ctypes.c_void_p] * 3 + [ctypes.c_int64] + [ctypes.c_void_p] * (len(widths) + 3)
+
+        def callback(N: int, phase: int, X: int, P: int, stride: int, *arrays: int) -> None:
+            out = _view(arrays[len(widths)], N, z if gradient else n)
+            try:
+                directions = [_view(a, N, width) for a, width in zip(arrays, widths)]
+                sizes = [_view(arrays[len(widths) + 1], 1, z)[0]] if gradient else []
+                parameters = _view(P, N, self.m) if stride else _view(P, 1, self.m)[0]
+                times = _view(phase, N, 1)[:, 0] if phase else None
+                out[:] = getattr(self, which)(times, _view(X, N, n), parameters, *directions, *sizes)
+            except (Exception, KeyboardInterrupt) as error:  # noqa: BLE001 - what is raised here must not enter C
+                known = isinstance(error, NonFiniteError) and error.__cause__ is not None
+                self.callback_error = error.__cause__ if known else error
+                out[:] = np.nan
 
         function = ctypes.CFUNCTYPE(None, *kinds)(callback)
         return int(ctypes.cast(function, ctypes.c_void_p).value or 0), function

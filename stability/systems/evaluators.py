@@ -76,6 +76,8 @@ class LlvmEvaluator(ExpressionEvaluator):
         code = self._code(which)
         return code.address, code
 
+    _native_directional = _native  # with all outputs: the last pointers of the C border are not read
+
     def _run(
         self, which: str, phase: Array | None, X: Array, P: Array, directions: tuple[Array, ...], out: tuple[Array, ...]
     ) -> None:

@@ -143,17 +143,20 @@ def test_local_solves_and_sweeps_against_dense_blocks(case):
     solve_stages_transposed(*c.factors(), y)
     assert np.abs(y - wanted).max() < 1e-11
     # forward and backward sweeps are adjoint: eta . du_N + rho . dY is the same number both ways
-    A, h, sigma, J, kept, position, LU, pivots = c.factors()
     C, eta, rho = (
         c.rng.standard_normal((c.N, c.size, 1)),
         c.rng.standard_normal(c.n),
         c.rng.standard_normal((c.N, c.size)),
     )
-    solved = C.copy()
-    solve_stages(*c.factors(), solved)
-    du, dY = forward_sweep(c.rule.update, c.Z, solved, np.zeros((c.N, c.n, 1)), np.zeros((c.n, 1)))
-    omega = adjoint_sweep(A, c.rule.row_sums, c.rule.update, h, sigma, J, kept, position, LU, pivots, rho, eta)
-    assert abs(eta @ du[0, -1] + (rho * dY[0]).sum() - (omega * C[:, :, 0]).sum()) < 1e-10 * np.abs(omega).max()
+    du, dY, omega = np.empty((c.N + 1, c.n)), np.empty((c.N, c.size)), np.empty((c.N, c.size))
+    forward_sweep(*c.factors(), c.rule.update, c.Z, 1, C.copy(), np.zeros(c.n), du, dY)
+    adjoint_sweep(*c.factors(), c.rule.update, c.rule.row_sums, rho, eta, omega)
+    assert abs(eta @ du[-1] + (rho * dY).sum() - (omega * C[:, :, 0]).sum()) < 1e-10 * np.abs(omega).max()
+    # what was solved before is taken as it is
+    again = np.empty_like(dY)
+    forward_sweep(*c.factors(), c.rule.update, c.Z, 0, np.linalg.solve([c.block(j) for j in range(c.N)], C),
+                  np.zeros(c.n), du, again)
+    assert np.abs(again - dY).max() < 1e-11 * (1 + np.abs(dY).max())
 
 
 def test_interval_matrix_is_the_matrix_exponential():

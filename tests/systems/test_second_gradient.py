@@ -1,5 +1,7 @@
 """Gradient of W . D_V F over states and parameters: machine code, numpy, and directional second derivatives agree."""
 
+import ctypes
+
 import numpy as np
 import pytest
 
@@ -48,3 +50,46 @@ def test_wrong_shapes_are_refused():
     phase, X, P, V, W, sizes = sample(system)
     with pytest.raises(InputError, match="direction"):
         evaluator(system).second_gradient(phase, X, P, V[:, :2], W, sizes)
+
+
+def pendulum_function(t, x, *, c):
+    return np.array([x[1], -np.sin(x[0]) - c * x[1] + np.cos(t)])
+
+
+@pytest.mark.parametrize("kind", ["llvm", "lambdify", "function"])
+def test_c_addresses_of_directional_derivatives_give_the_same_numbers(kind):
+    """As a kernel calls them: shared or own parameters, `sizes` behind the result."""
+    system = st.models.autoparametric_pendulum()
+    if kind == "function":
+        system = st.System.from_function(pendulum_function, states="x v", parameters={"c": 0.2}, period=2 * np.pi)
+    e = evaluator(system) if kind == "function" else evaluator(system, kind)
+    phase, X, P, V, W, sizes = sample(system)
+    U = np.ascontiguousarray(V[::-1])
+    given = {"second": (V, U), "third": (V, U, 0.5 * V + U), "second_gradient": (V, W)}
+    for which, directions in given.items():
+        scaled = (sizes,) if which == "second_gradient" else ()
+        want = getattr(e, which)(phase, X, P, *directions, *scaled)
+        kinds = [ctypes.c_int64] + [ctypes.c_void_p] * 3 + [ctypes.c_int64] + [ctypes.c_void_p] * (len(directions) + 3)
+        call = ctypes.CFUNCTYPE(None, *kinds)(e.directional_address(which))
+        for stride, parameters in ((0, P), (len(P), np.tile(P, (len(X), 1)))):
+            out = np.full(want.shape, np.nan)
+            arrays = [a.ctypes.data for a in (*directions, out, sizes)]
+            call(len(X), phase.ctypes.data, X.ctypes.data, parameters.ctypes.data, stride, *arrays, None)
+            np.testing.assert_array_equal(out, want)
+    with pytest.raises(InputError, match="'F'"):
+        e.directional_address("F")
+
+
+def test_an_error_behind_the_address_becomes_nan_and_is_kept():
+    def f(t, x, *, c):
+        if np.any(np.abs(x) > 10):
+            raise ZeroDivisionError("far out")
+        return np.array([x[1], -c * x[0]])
+
+    e = evaluator(st.System.from_function(f, states="x v", parameters={"c": 0.2}, period=2 * np.pi))
+    kinds = [ctypes.c_int64] + [ctypes.c_void_p] * 3 + [ctypes.c_int64] + [ctypes.c_void_p] * 5
+    phase, X, P, V, out = np.zeros(1), np.full((1, 2), 50.0), np.array([0.2]), np.ones((1, 3)), np.zeros((1, 2))
+    pointers = [a.ctypes.data for a in (phase, X, P)]
+    call = ctypes.CFUNCTYPE(None, *kinds)(e.directional_address("second"))
+    call(1, *pointers, 0, *[a.ctypes.data for a in (V, V, out)], None, None)
+    assert np.isnan(out).all() and "far out" in e.failure()
