@@ -11,6 +11,8 @@ Reference: Govaerts (2000), chapter 3.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 from llvmlite import ir
 from numba import types
@@ -23,6 +25,7 @@ from stability.kernels.caching import kernel
 __all__ = ["bordered", "borders", "lapack"]
 
 
+@functools.cache
 def lapack() -> tuple[int, int]:
     """Addresses of dgesvd and dgesv for the kernels below."""
     import scipy.linalg.cython_lapack  # noqa: F401 - the address is looked up in the imported module

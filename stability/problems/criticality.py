@@ -50,7 +50,8 @@ def criticality_of(problem: Any, kind: Kind, u: Array, params: Array, linearisat
 
 def _smoothness(problem: Any, u: Array, params: Array) -> int:
     """Order of the sharpest kink that the equilibrium or orbit meets (see `kinks`)."""
-    if not has_switches(problem.system):
+    kinked = getattr(problem, "kinked", None)  # known once and for all of a collocation problem
+    if not (has_switches(problem.system) if kinked is None else kinked):
         return SMOOTH
     if hasattr(problem, "discretise"):
         return smoothness_along(problem.system, problem.view(u, params))

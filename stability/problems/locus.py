@@ -320,20 +320,20 @@ class Locus:
             x = self._settled(u, params)
         t = self.parts(tangent.u)[0]
         better = self.inner.adapt(x, params, Tangent(t, tangent.parameter, tangent.weight))
-        if better is None:
-            moved = self._moved(self.inner, x, t, u, tangent)
-            return None if moved[0].scale == self.scale else moved
-        moved = self._moved(better[0], better[1], better[2].u, u, tangent)
-        if self.kind is Kind.BRANCH_POINT and better[1].size == x.size and np.array_equal(better[1], x):
-            return moved  # other scales
+        if better is None or better[1] is x:  # other scales at most, which leave solutions as they are
+            inner = self.inner if better is None else better[0]
+            problem, _, moved = self._moved(inner, x, t, u, tangent)
+            return None if inner is self.inner and problem.scale == self.scale else (problem, u, moved)
+        new = self._moved(better[0], better[1], better[2].u, u, tangent)
         if self.kind is Kind.BRANCH_POINT:
-            again = moved[0].correct(moved[1], params, self.along, moved[2], 0.0, 1e-8)
+            again = new[0].correct(new[1], params, self.along, new[2], 0.0, 1e-8)
             if not again.converged:
                 if not hasattr(self.inner, "rescaled"):
                     return None
                 scaled = self.inner.rescaled(better[0].scales, better[0].period_scale)
-                return self._moved(scaled, x, t, u, tangent)
-        return moved
+                problem, _, moved = self._moved(scaled, x, t, u, tangent)
+                return problem, u, moved
+        return new
 
     def _moved(self, inner: Any, x: Array, t: Array, u: Array, tangent: Tangent) -> tuple[Locus, Array, Tangent]:
         """This curve over another inner problem, with unknowns x and direction t there."""

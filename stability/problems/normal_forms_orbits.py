@@ -27,7 +27,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..kernels.condensation_sweeps import adjoint_sweep
+from ..kernels.bordering import lapack
+from ..kernels.condensation_cubic import cubic_terms
+from ..kernels.condensation_sweeps import sweeps
 
 __all__ = ["MapForms"]
 
@@ -41,7 +43,7 @@ class MapForms:
         mesh, problem = L.mesh, L.problem
         self.L, self.n, self.own = L, mesh.n, mesh.own
         self.scales = np.asarray(problem.scales)
-        self.states = np.ascontiguousarray(mesh.split(L.u)[1].reshape(-1, self.n))
+        self.states = np.ascontiguousarray(mesh.split(L.u)[1])
         self.matrix, self.sizes, self.basis = np.asarray(L.spectral), self.scales, np.eye(self.n)
         if self.own:
             self.start = np.ascontiguousarray(mesh.split(L.u)[0][:1])
@@ -62,7 +64,7 @@ class MapForms:
             direction = np.zeros((len(v), self.n + len(L.params)))
             direction[:, : self.n] = v
             directions.append(direction)
-        return np.asarray(function(L.mesh.phase, self.states, L.params, *directions))
+        return np.asarray(function(L.mesh.phase, self.states.reshape(-1, self.n), L.params, *directions))
 
     def _sweep(self, start: Array, forcing: Array | None) -> tuple[Array, Array]:
         """(end (n,), stages (count, n)) of the variation from `start` with f's inhomogeneity `forcing` (count, n)."""
@@ -126,18 +128,14 @@ class MapForms:
         """
         if self.own:
             return None
-        L, mesh, zero = self.L, self.L.mesh, np.zeros(self.n)
-        _, V = self._sweep(self.scales * q, None)
-        end, W = self._sweep(zero, self._derivative(V, V))
-        h = np.linalg.solve(np.eye(self.n) - self.matrix, self._returned(end))
-        _, H = self._sweep(self.scales * h, None)
-        eta = np.linalg.solve(L.problem.closure.T, p / self.scales)
-        none = np.zeros((mesh.intervals, mesh.degree * self.n))
-        omega = np.empty_like(none)
-        adjoint_sweep(*L.factors(), mesh.rule.update, mesh.rule.row_sums, none, eta, omega)
-        weighted = L.sigma * (omega * mesh.h[:, None]).reshape(-1, self.n)
-        cubic = self._derivative(V, V, V) + 3 * self._derivative(V, W)
-        return float((weighted * cubic).sum()) / 6, float((weighted * self._derivative(V, H)).sum()) / 2
+        L, mesh, rule = self.L, self.L.mesh, self.L.mesh.rule
+        derivative, terms = L.problem.evaluations.directional_address, np.empty(2)
+        cubic_terms(
+            sweeps(), lapack()[1], derivative("second"), derivative("third"), *L.factors(), rule.update,
+            rule.row_sums, L.work.Z, L.problem.closure, self.scales, self.matrix, np.ascontiguousarray(p),
+            np.ascontiguousarray(q), mesh.phase, self.states, L.params, L.sizes, terms,
+        )  # fmt: skip
+        return float(terms[0]), float(terms[1])
 
     # ------------------------------------------------------------------ multilinear forms
     def second(self, x: Any, y: Any) -> Any:

@@ -12,6 +12,7 @@ import sympy as sp
 
 import stability as st
 from stability.errors import StabilityWarning
+from stability.problems.normal_forms_orbits import MapForms
 from stability.protocols import Tangent
 from stability.words import Kind
 
@@ -127,3 +128,20 @@ def test_the_same_solution_as_by_the_general_builder(case, ds):
     target = curves[0].targets(curves[0].parts(one.u)[2])[0]
     assert np.abs(np.linalg.eigvals(L.spectral) - target).min() < 1e-5  # the square root of rounding at a defective one
     assert max(one.residual, other.residual) < 1e-9
+
+
+@pytest.mark.parametrize("case", ["doubling", "symmetry"])
+def test_cubic_terms_by_one_pass_are_those_of_the_multilinear_forms(case):
+    """p.C(q, q, q)/6 and p.B(q, h)/2 by the general forms, whose derivatives are taken sweep by sweep."""
+    point, _ = case_of(case)
+    L = point.problem.linearise(point.u, point.params_vector)
+    forms = MapForms(L)
+    left, _, right = np.linalg.svd(forms.matrix + np.eye(forms.n))
+    q, p = right[-1], left[:, -1] / (left[:, -1] @ right[-1])
+    h = np.linalg.solve(np.eye(forms.n) - forms.matrix, forms.second(q, q))
+    wanted = p @ forms.third(q, q, q) / 6, p @ forms.second(q, h) / 2
+    got = forms.cubic_terms(p, q)
+    assert got == pytest.approx(wanted, rel=1e-10, abs=1e-12 * max(np.abs(wanted)))
+    assert abs(wanted[0]) > 1e-6
+    zero = forms.cubic_terms(p, 0 * q)
+    assert zero == (0.0, 0.0)
