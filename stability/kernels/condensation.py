@@ -17,7 +17,8 @@ Oscillators have equations x_a' = v exactly. Their stages are known from those o
 
 and are eliminated by hand; only the *kept* states enter the factorisation (half of them for a mechanical system, an
 eighth of the work): G' = W x I - h sigma diag(J_vv) - (h sigma)^2 A_ik J_{vx,i}. ``kept[c]`` is the state index of the
-c-th kept state, ``position[c]`` the state whose derivative it is, or -1. det G and det G' have the same sign.
+c-th kept state, ``position[c]`` the state whose derivative it is, or -1. det G and det G' have the same sign. Rows and
+columns of G' are ordered by state, then by stage (c m + i): what the Jacobian leaves out are then whole blocks.
 Reference: T. F. Fairgrieve, A. D. Jepson (1991), SIAM J. Numer. Anal. 28, 1446-1462 (condensation and multipliers).
 """
 
@@ -57,7 +58,7 @@ def _expand(A, scale, kept, position, T, size, n, H, columns, j):  # type: ignor
         a, state = position[c], kept[c]
         for i in range(degree):
             for e in range(extra):
-                columns[j, i * n + state, e] = T[i * small + c, e]
+                columns[j, i * n + state, e] = T[c * degree + i, e]
         if a < 0:
             continue
         for i in range(degree):
@@ -66,52 +67,70 @@ def _expand(A, scale, kept, position, T, size, n, H, columns, j):  # type: ignor
             for k in range(degree):
                 factor = scale * A[i, k]
                 for e in range(extra):
-                    columns[j, i * n + a, e] += factor * T[k * small + c, e]
+                    columns[j, i * n + a, e] += factor * T[c * degree + k, e]
 
 
 # ---------------------------------------------------------------------- many intervals at a time
 @kernel(inline=True)
-def _template(W, A, row_sums, kept, position, n, columns, first, lanes, T, H):  # type: ignore[no-untyped-def]
+def _template(W, A, row_sums, kept, position, n, columns, first, lanes, T, H, V):  # type: ignore[no-untyped-def]
     """What of T = [G' | du_0 columns | C'] does not depend on J, and H: sum_k A_ik C_k of the equations x' = v."""
     degree, small, extra = W.shape[0], kept.shape[0], columns.shape[2]
     size = degree * small
-    for i in range(degree):
-        for c in range(small):
-            row, a = i * small + c, position[c]
+    for c in range(small):
+        a, state = position[c], kept[c]
+        for i in range(degree):
+            row = c * degree + i
             for k in range(size + n):
                 for q in range(lanes):
                     T[row, k, q] = 0.0
             for k in range(degree):
                 for q in range(lanes):
-                    T[row, k * small + c, q] = W[i, k]
+                    T[row, c * degree + k, q] = W[i, k]
             for q in range(lanes):
-                T[row, size + kept[c], q] = row_sums[i]
+                T[row, size + state, q] = row_sums[i]
             for e in range(extra):
                 for q in range(lanes):
-                    T[row, size + n + e, q] = columns[first + q, i * n + kept[c], e]
+                    T[row, size + n + e, q] = columns[first + q, i * n + state, e]
+            for e in range(extra):
+                for q in range(lanes):
                     H[i, c, e, q] = 0.0
-                if a >= 0:
-                    for k in range(degree):
-                        for q in range(lanes):
-                            H[i, c, e, q] += A[i, k] * columns[first + q, k * n + a, e]
+        for k in range(degree if a >= 0 else 0):
+            for e in range(extra):
+                for q in range(lanes):
+                    V[e, q] = columns[first + q, k * n + a, e]
+            for i in range(degree):
+                for e in range(extra):
+                    for q in range(lanes):
+                        H[i, c, e, q] += A[i, k] * V[e, q]
 
 
 @kernel(inline=True)
-def _assemble(A, scale, J, kept, position, extra, first, lanes, H, slope, T):  # type: ignore[no-untyped-def]
-    """Add what depends on the Jacobians J of the intervals first .. first + lanes."""
+def _assemble(A, scale, J, kept, position, extra, first, lanes, H, slope, T, V, begin, end):  # type: ignore[no-untyped-def]
+    """Add what depends on the Jacobians J of the intervals first .. first + lanes; where rows of G' begin and end."""
     degree, small, n = A.shape[0], kept.shape[0], J.shape[1]
     size = degree * small
-    for i in range(degree):
-        for c in range(small):
-            row, state = i * small + c, kept[c]
-            for b in range(small):
-                column, a = i * small + b, position[b]
+    for c in range(small):
+        for i in range(degree):
+            row = c * degree + i
+            begin[row], end[row] = c * degree, (c + 1) * degree
+            for b in range(n):
                 for q in range(lanes):
-                    T[row, column, q] -= scale[q] * J[(first + q) * degree + i, state, kept[b]]
+                    V[b, q] = J[(first + q) * degree + i, kept[c], b]
+            for b in range(small):
+                a, state, coupled = position[b], kept[b], False
+                q = 0
+                while q < lanes and not coupled:
+                    coupled = V[state, q] != 0.0 or (a >= 0 and V[a, q] != 0.0)
+                    q += 1
+                if not coupled:
+                    continue
+                begin[row], end[row] = min(begin[row], b * degree), max(end[row], (b + 1) * degree)
+                for q in range(lanes):
+                    T[row, b * degree + i, q] -= scale[q] * V[state, q]
                 if a < 0:
                     continue
                 for q in range(lanes):
-                    slope[q] = scale[q] * J[(first + q) * degree + i, state, a]
+                    slope[q] = scale[q] * V[a, q]
                     T[row, size + a, q] += slope[q]
                 for e in range(extra):
                     for q in range(lanes):
@@ -120,35 +139,39 @@ def _assemble(A, scale, J, kept, position, extra, first, lanes, H, slope, T):  #
                     slope[q] *= scale[q]
                 for k in range(degree):
                     for q in range(lanes):
-                        T[row, k * small + b, q] -= slope[q] * A[i, k]
+                        T[row, b * degree + k, q] -= slope[q] * A[i, k]
 
 
 @kernel(inline=True)
-def _collect(A, scale, kept, position, T, size, n, H, first, lanes, hold, columns, Z):  # type: ignore[no-untyped-def]
+def _collect(A, scale, kept, position, T, size, n, H, first, lanes, V, columns, Z):  # type: ignore[no-untyped-def]
     """The stages of all states from those of the kept ones: columns (N, mn, K) and Z (N, mn, n)."""
     degree, small, extra = A.shape[0], kept.shape[0], columns.shape[2]
     for c in range(small):
         a, state = position[c], kept[c]
         for i in range(degree):
+            row = c * degree + i
+            for b in range(n):
+                for q in range(lanes):
+                    Z[first + q, i * n + state, b] = T[row, size + b, q]
+            for e in range(extra):
+                for q in range(lanes):
+                    columns[first + q, i * n + state, e] = T[row, size + n + e, q]
+            if a < 0:
+                continue
             for b in range(n + extra):
                 for q in range(lanes):
-                    value = T[i * small + c, size + b, q]
-                    if b < n:
-                        Z[first + q, i * n + state, b] = value
-                    else:
-                        columns[first + q, i * n + state, b - n] = value
-                if a < 0:
-                    continue
-                for q in range(lanes):
-                    hold[q] = 0.0
+                    V[b, q] = 0.0
                 for k in range(degree):
                     for q in range(lanes):
-                        hold[q] += A[i, k] * T[k * small + c, size + b, q]
+                        V[b, q] += A[i, k] * T[c * degree + k, size + b, q]
+            for b in range(n):
                 for q in range(lanes):
-                    if b < n:
-                        Z[first + q, i * n + a, b] = scale[q] * hold[q] + (1.0 if a == b else 0.0)
-                    else:
-                        columns[first + q, i * n + a, b - n] = scale[q] * hold[q] + H[i, c, b - n, q]
+                    Z[first + q, i * n + a, b] = scale[q] * V[b, q]
+            for q in range(lanes):
+                Z[first + q, i * n + a, a] += 1.0
+            for e in range(extra):
+                for q in range(lanes):
+                    columns[first + q, i * n + a, e] = scale[q] * V[n + e, q] + H[i, c, e, q]
 
 
 @kernel
@@ -163,8 +186,9 @@ def condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, p
     size = degree * small
     width = size + n + extra
     most = min(intervals, min(LANES, max(16, MEMORY // (size * width))))
-    T, H = np.empty((size, width, most)), np.empty((degree, small, extra, most))
+    T, H, V = np.empty((size, width, most)), np.empty((degree, small, extra, most)), np.empty((n + extra, most))
     swaps, hold, scale = np.empty((size, most), np.int64), np.empty(most), np.empty(most)
+    begin, end = np.empty(size, np.int64), np.empty(size, np.int64)
     total = 1.0
     for i in range(degree):
         total -= update[i]
@@ -173,27 +197,26 @@ def condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, p
         lanes = min(most, intervals - first)
         for q in range(lanes):
             scale[q] = h[first + q] * sigma
-        _template(W, A, row_sums, kept, position, n, columns, first, lanes, T, H)
-        _assemble(A, scale, J, kept, position, extra, first, lanes, H, hold, T)
-        sign *= eliminate_lanes(T, size, width, lanes, swaps, hold)
+        _template(W, A, row_sums, kept, position, n, columns, first, lanes, T, H, V)
+        _assemble(A, scale, J, kept, position, extra, first, lanes, H, hold, T, V, begin, end)
+        sign *= eliminate_lanes(T, size, width, lanes, swaps, hold, begin, end)
         if sign == 0.0:
             return 0.0
         if LU.shape[0] > 0:
             for row in range(size):
                 for q in range(lanes):
                     pivots[first + q, row] = swaps[row, q]
-                for k in range(size):
-                    for q in range(lanes):
+                    for k in range(size):
                         LU[first + q, row, k] = T[row, k, q]
-        substitute_lanes(T, size, width, lanes, hold)
-        _collect(A, scale, kept, position, T, size, n, H, first, lanes, hold, columns, Z)
+        substitute_lanes(T, size, width, lanes, hold, end)
+        _collect(A, scale, kept, position, T, size, n, H, first, lanes, V, columns, Z)
     for j in range(intervals):
         for a in range(n):
             for b in range(n):
-                value = total if a == b else 0.0
-                for i in range(degree):
-                    value += update[i] * Z[j, i * n + a, b]
-                M[j, a, b] = value
+                M[j, a, b] = total if a == b else 0.0
+            for i in range(degree):
+                for b in range(n):
+                    M[j, a, b] += update[i] * Z[j, i * n + a, b]
     return sign
 
 
@@ -210,12 +233,12 @@ def solve_stages(A, h, sigma, J, kept, position, LU, pivots, columns):  # type: 
         for i in range(degree):
             for c in range(small):
                 for e in range(extra):
-                    T[i * small + c, e] = columns[j, i * n + kept[c], e]
+                    T[c * degree + i, e] = columns[j, i * n + kept[c], e]
                 for b in range(small):
                     if position[b] >= 0:
                         slope = scale * J[j * degree + i, kept[c], position[b]]
                         for e in range(extra):
-                            T[i * small + c, e] += slope * H[i, b, e]
+                            T[c * degree + i, e] += slope * H[i, b, e]
         for p in range(size):
             row = pivots[j, p]
             if row != p:
@@ -248,10 +271,10 @@ def solve_stages_transposed(A, h, sigma, J, kept, position, LU, pivots, columns)
         scale = h[j] * sigma
         for i in range(degree):
             for c in range(small):
-                y[i * small + c] = columns[j, i * n + kept[c]]
+                y[c * degree + i] = columns[j, i * n + kept[c]]
                 if position[c] >= 0:
                     for k in range(degree):
-                        y[i * small + c] += scale * A[k, i] * columns[j, k * n + position[c]]
+                        y[c * degree + i] += scale * A[k, i] * columns[j, k * n + position[c]]
         for p in range(size):
             for i in range(p):
                 y[p] -= LU[j, i, p] * y[i]
@@ -268,7 +291,7 @@ def solve_stages_transposed(A, h, sigma, J, kept, position, LU, pivots, columns)
                 for i in range(degree):
                     hold[i] = columns[j, i * n + a]
                     for b in range(small):
-                        hold[i] += scale * J[j * degree + i, kept[b], a] * y[i * small + b]
+                        hold[i] += scale * J[j * degree + i, kept[b], a] * y[b * degree + i]
                 for i in range(degree):
                     value = 0.0
                     for k in range(degree):
@@ -276,4 +299,4 @@ def solve_stages_transposed(A, h, sigma, J, kept, position, LU, pivots, columns)
                     columns[j, i * n + a] = value
         for i in range(degree):
             for c in range(small):
-                columns[j, i * n + kept[c]] = y[i * small + c]
+                columns[j, i * n + kept[c]] = y[c * degree + i]

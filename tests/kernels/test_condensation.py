@@ -128,6 +128,52 @@ def test_determinant_sign_does_not_depend_on_the_mesh_and_flips_with_the_determi
     assert all(s == d for _, s, d in signs)
 
 
+def _chain(n):
+    """States that know their neighbours only."""
+    return np.abs(np.subtract.outer(np.arange(n), np.arange(n))) <= 1
+
+
+PATTERNS = {
+    "chain": _chain,
+    "apart": lambda n: np.kron(np.eye(-(-n // 2)), np.ones((2, 2)))[:n, :n] > 0,
+    "arrow": lambda n: np.eye(n, dtype=bool) | (np.arange(n) == 0)[:, None] | (np.arange(n) == 0),
+    "down": lambda n: np.tri(n, dtype=bool),
+    "at random": lambda n: np.random.default_rng(n).random((n, n)) < 0.3,
+}
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+@pytest.mark.parametrize("oscillator", (False, True))
+@pytest.mark.parametrize("sigma", (2.3, 60.0))
+def test_zeros_of_the_jacobian_against_dense_blocks(pattern, oscillator, sigma):
+    """Blocks of zeros are left out: the same solutions, factors and sign, also with rows interchanged (sigma = 60)."""
+    n = 12
+    c = Case(n, 5, 4, oscillator, seed=8)
+    c.sigma = sigma
+    half = n // 2 if oscillator else 0
+    known = PATTERNS[pattern](n - half)
+    c.J[:, half:, half:] *= known
+    c.J[:, half:, :half] *= known[:, :half]
+    c.J[3, half:] = 0.0  # and a point of an interval where nothing is coupled
+    X = c.rng.standard_normal((c.N, c.size, 2))
+    blocks = [c.block(j) for j in range(c.N)]
+    wanted, again = np.array([np.linalg.solve(G, x) for G, x in zip(blocks, X)]), X.copy()
+    sign = c.condense(X)
+    assert sign == np.prod([np.sign(np.linalg.det(G)) for G in blocks])
+    limit = 1e-13 * max(np.linalg.cond(G) for G in blocks) * np.abs(wanted).max()
+    assert np.abs(X - wanted).max() < limit
+    ones = np.kron(c.rule.row_sums[:, None], np.eye(n))
+    assert np.abs(c.Z - [np.linalg.solve(G, ones) for G in blocks]).max() < limit
+    solve_stages(*c.factors(), again)
+    assert np.abs(again - wanted).max() < limit
+    y = c.rng.standard_normal((c.N, c.size))
+    wanted = np.array([np.linalg.solve(G.T, row) for G, row in zip(blocks, y)])
+    solve_stages_transposed(*c.factors(), y)
+    assert np.abs(y - wanted).max() < limit * max(1.0, np.abs(wanted).max())
+    moved = (c.pivots != np.arange(c.pivots.shape[1])).any()
+    assert moved or sigma < 50 or pattern == "down"
+
+
 @pytest.mark.parametrize("case", CASES[:5])
 def test_local_solves_and_sweeps_against_dense_blocks(case):
     c = Case(*case)
