@@ -92,28 +92,37 @@ class Corrected(NamedTuple):
 class Stretch(NamedTuple):
     """What the driver asks of a problem that can take several steps in one call (`StridingProblem`).
 
-    The last point (u, params, values of its spectrum), its tangent and those before it (latest first, on the same mesh)
-    with the lengths of the steps that led to them; `length` of the first step to try, at most `most` steps, each inside
-    the `window` of the parameter. `limits` (angle, chord, miss, motion) and `pace` (longest step, far, few,
-    approach, creep) are the driver's constants.
+    The last point (u, params), its tangent and those before it (latest first, on the same mesh) with the lengths of the
+    steps that led to them; spectra, test functions and signs of determinants of it and of the point before, on any
+    mesh; `older`: that one's rate of the parameter, and the arclength from it. `length` of the first step to try, at
+    most `most` steps, each inside the `window` of the parameter. `limits` (angle, chord, miss, motion), `pace` (longest
+    step, far, few, approach, creep) and `watch` (dip, fall, turn) are the driver's constants.
     """
 
     u: Array
     params: Array
     free: str
-    values: NDArray[np.complex128]
     tangents: tuple[Tangent, ...]
     steps: tuple[float, ...]
+    spectra: tuple[Spectrum, ...]
+    tests: tuple[tuple[float, float, float], ...]
+    signs: tuple[int, ...]
+    older: tuple[float, float]
     length: float
     most: int
     window: tuple[float, float]
     tolerance: float
     limits: tuple[float, float, float, float]
     pace: tuple[float, float, float, float, float]
+    watch: tuple[float, float, float]
 
 
 class Stride(NamedTuple):
-    """One plainly good step: the point, the length tried, its distance, and what is left of the limits (at most 1)."""
+    """One plainly good step: the point, the length tried, its distance, and what is left of the limits (at most 1).
+
+    The spectrum and its test functions, where nothing about them is in doubt (else this is the last step of a stretch);
+    quiet: nothing can have happened on the way.
+    """
 
     found: Corrected
     tried: float
@@ -123,6 +132,9 @@ class Stride(NamedTuple):
     missed: float
     motion: float
     following: float  # length to try next
+    spectrum: Spectrum | None
+    tests: tuple[float, float, float] | None
+    quiet: bool
 
 
 class Seed(NamedTuple):

@@ -22,11 +22,12 @@ from numpy.typing import NDArray
 from ..words import Kind
 from .points import Point
 
-__all__ = ["Changes", "Dip", "changes", "crossed", "dip_of", "double_turn", "supported"]
+__all__ = ["TURN", "Changes", "Dip", "changes", "crossed", "dip_of", "double_turn", "supported"]
 
 
 _LOST = 0.1  # an error of multipliers (eigenvalues: relative to the largest) beyond which counts mean nothing
 _FEW = 6
+TURN = 0.02  # part of a rate of the parameter below which an extreme rate is looked at
 _STILL = 1e-10  # a scaled rate of the parameter that is rounding
 
 
@@ -147,7 +148,7 @@ def double_turn(a: Point, b: Point) -> float | None:
     if not 0 < x < 1:
         return None
     rate = r0 * (1 - x) * (1 - 3 * x) + 6 * x * (1 - x) * mean + r1 * x * (3 * x - 2)
-    return a.s + x * h if rate * r0 <= 0.02 * r0 * r0 else None
+    return a.s + x * h if rate * r0 <= TURN * r0 * r0 else None
 
 
 def test_value(p: Point, which: int) -> float:

@@ -30,7 +30,7 @@ from .events import changes
 from .locating import Found, Locator, chord_length
 from .loops import Home, collapsed
 from .monitoring import Monitor
-from .points import Point, dot, make_point, rescaled
+from .points import Point, dot, make_point, rescaled, strode
 from .searching import between, hopped
 from .settings import Progress, Settings
 from .stepping import KINK, Comparison, compare, next_length, predict
@@ -154,6 +154,8 @@ class Follower(Iterator[Point]):
                 continue
             if end is not None:
                 made = (end[1], made[1])
+            if made[1].quiet and end is None:
+                return *made, []
             found, doubtful = between(self.locator, self.before, self.last, made[0], self._twin)
             found = [f for f in found if not self._known(f)] + ([end[0]] if end is not None else [])
             strange = any(f.kind is Kind.UNEXPLAINED for f in found)
@@ -173,11 +175,10 @@ class Follower(Iterator[Point]):
         """An accepted point, or the factor by which to shorten the step."""
         settings, last = self.settings, self.last
         stride = self._strides.step(last, self._past, h, _ADAPT_EVERY - self.since_adapt)
-        if stride is not None and stride.found.tangent is not None:
-            s, tangent = last.s + stride.distance, stride.found.tangent
-            point = make_point(last.problem, stride.found, tangent, settings.index, s, stride.distance)
-            if np.isfinite(point.spectrum.values).all():
-                return point, Comparison(*stride[2:])
+        if stride is not None:
+            point = strode(last, stride, settings.index)
+            if point is not None:
+                return point, Comparison(*stride[2:8], quiet=stride.quiet)
         u, parameter = predict(last, self._past, h)
         landed = self._landed(parameter, u, h)
         if landed is not None:

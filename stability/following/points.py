@@ -18,9 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..protocols import Corrected, Problem, Spectrum, Tangent
+from ..protocols import Corrected, Problem, Spectrum, Stride, Tangent
 
-__all__ = ["Point", "dot", "make_point", "rescaled", "smooth_tests", "tangent_of"]
+__all__ = ["Point", "dot", "make_point", "rescaled", "smooth_tests", "strode", "tangent_of"]
 
 Array = NDArray[np.float64]
 _SMALL = 6
@@ -95,6 +95,20 @@ def make_point(problem: Problem, found: Corrected, tangent: Tangent, k: int, s: 
         problem, found.u, found.params, parameter, tangent, spectrum, tests, found.determinant_sign, found.residual,
         found.iterations, s, step,
     )
+
+
+def strode(last: Point, stride: Stride, k: int) -> Point | None:
+    """The point that a problem's own step from `last` leads to; None where its spectrum is not finite."""
+    found, tangent, s = stride.found, stride.found.tangent, last.s + stride.distance
+    if tangent is None:
+        return None
+    if stride.spectrum is None or stride.tests is None:
+        point = make_point(last.problem, found, tangent, k, s, stride.distance)
+        return point if np.isfinite(point.spectrum.values).all() else None
+    return Point(
+        last.problem, found.u, found.params, float(found.params[k]), tangent, stride.spectrum, stride.tests,
+        found.determinant_sign, found.residual, found.iterations, s, stride.distance,
+    )  # fmt: skip
 
 
 def rescaled(point: Point, problem: Problem) -> Point:

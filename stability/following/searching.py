@@ -14,15 +14,16 @@ from __future__ import annotations
 from itertools import pairwise
 
 from ..words import Kind
-from .events import Triple, crossed, dip_of, double_turn, growth_of, matched, supported
+from .events import TURN, Triple, crossed, dip_of, double_turn, growth_of, matched, supported
 from .locating import Found, Locator, shown
 from .points import Point
 
-__all__ = ["between", "hopped"]
+__all__ = ["WATCH", "between", "hopped"]
 
 _DIP = 0.15  # a vertex below this part of its neighbours is looked at
 _MANY = 6  # values beyond which their product is no test
 _SUDDEN = 0.2  # a value that comes down to less than this part of itself in a step
+WATCH = (_DIP, _SUDDEN, TURN)  # for problems that look at several steps by themselves
 
 
 def between(

@@ -66,6 +66,7 @@ class Comparison(NamedTuple):
     missed: float
     motion: float
     following: float | None = None  # the next length, where it is known already
+    quiet: bool = False  # nothing can have happened on the way
 
     @property
     def worst(self) -> float:

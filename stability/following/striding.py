@@ -3,7 +3,7 @@
 A `StridingProblem` predicts, corrects and judges by itself, by the limits and the pace of `stepping`, and gives back
 the steps that are plainly good. The first that is not, is taken here step by step; so is a step that turns out to need
 another length than the one it was made with, and all that follow from it are dropped. Events between the points are
-looked for as between any others.
+looked for as between any others, unless the problem has ruled them out.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..protocols import Stretch, Stride
 from .points import Point
+from .searching import WATCH
 from .settings import Settings
 from .stepping import LIMITS, ORDER, PACE
 
@@ -43,7 +44,7 @@ class Strides:
         if made is None or made.tried != h:
             self._left, self._refused = 0, last.u
             return None
-        self._left -= 1
+        self._left = self._left - 1 if made.spectrum is not None else 0
         self._from = made.found.u
         return made
 
@@ -58,10 +59,12 @@ class Strides:
             if point.problem is not problem:
                 break
             points.append(point)
+        two = (last, *past[:1])
         self._steps = strides(
             Stretch(
-                last.u, last.params, settings.name, last.spectrum.values, tuple(p.tangent for p in points),
-                tuple(p.step for p in points), h, count, (settings.low, settings.high), settings.tolerance, LIMITS,
-                (settings.steps.longest, *PACE),
+                last.u, last.params, settings.name, tuple(p.tangent for p in points), tuple(p.step for p in points),
+                tuple(p.spectrum for p in two), tuple(p.tests for p in two), tuple(p.determinant_sign for p in two),
+                (past[0].tangent.parameter, last.s - past[0].s) if past else (0.0, 0.0), h, count,
+                (settings.low, settings.high), settings.tolerance, LIMITS, (settings.steps.longest, *PACE), WATCH,
             )
         )  # fmt: skip

@@ -9,8 +9,8 @@ product <(u, l), (v, k)> = sum w u v + weight^2 l k:
     next       half of the limits, few Newton iterations, not beyond where a multiplier becomes critical
 
 The march ends before the first step that is not plainly good: one that Newton or a check refuses, or that leaves the
-window of the parameter. Whoever asked for it then goes on step by step, and looks for events between the points; here
-nothing is decided but how far to go. Multipliers: closed form for one or two, LAPACK's dgeev by its address otherwise;
+window of the parameter. Whoever asked for it then goes on step by step, and looks for events between the points, where
+`quiet_segments` cannot rule them out. Multipliers: closed form for one or two, LAPACK's dgeev by its address otherwise;
 of an autonomous orbit the direction f of the flow is removed by a reflection (`problems/orbit_spectrum.py`).
 """
 
@@ -24,6 +24,7 @@ from stability.kernels.addresses import call_eigenvalues, call_field, eigenvalue
 from stability.kernels.caching import kernel
 from stability.kernels.condensation_newton import NEWTON, newton, solvers
 from stability.kernels.condensation_reduced import summary
+from stability.kernels.quiet_segments import quiet, reading
 
 __all__ = ["addresses", "march"]
 
@@ -223,17 +224,22 @@ def _compare(weights, weight, points, tangents, rates, guess, k, now, change, mi
 @kernel
 def march(  # type: ignore[no-untyped-def]
     by, field, period, span, phase, h, W, A, row_sums, update, b, leading, kept, position, S, jump, scales, weights,
-    stage_weights, tolerance, max_iterations, free, own, past, weight, window, limits, pace, length,
-    P, points, tangents, rates, steps, re, im, T, F, J, Fp, dT, LU, pivots, Z, M, x, products, spectral, report, seen,
+    stage_weights, tolerance, max_iterations, free, own, past, weight, window, limits, pace, watch, older, known, trust,
+    orientation, length,
+    P, points, tangents, rates, steps, re, im, readings, signs, T, F, J, Fp, dT, LU, pivots, Z, M, x, products,
+    spectral, report, seen,
 ):  # fmt: skip
     """Take steps until one is not plainly good; returns how many were taken, at most K.
 
-    Row 0 of P (K + 1, m), points (K + 1, N), re and im (K + 1, n) is the last point of the branch, row `past` of
-    tangents (past + 1 + K, N), rates and steps its tangent and the length of the step to it, earlier ones before.
-    limits : of angle, chord, miss, motion; pace : longest step, far, few, approach, creep.
-    The rows 1 .. are filled, with T, F, J, Fp, dT, Z, M of each step, products and spectral (K, n, n) the
-    monodromy matrix as it is and scaled, report (K, 4) of Newton's method, and seen (K, 10): length tried, distance, then
-    angle, chord, miss and motion over their limits, the next length, int tr J ds, roughness, |M f - f| / |f|.
+    Row 0 of P (K + 1, m) and points (K + 1, N) is the last point of the branch; row `past` of tangents
+    (past + 1 + K, N), rates and steps its tangent and the length of the step to it, earlier ones before; row 1 of re,
+    im (K + 2, n), readings (K + 2, 9) and signs its multipliers, row 0 those of the point before, `older` that point's
+    rate and the arclength from it (0: there is none). limits : of angle, chord, miss, motion; pace : longest step, far,
+    few, approach, creep; watch, known, trust : see quiet_segments. The rows behind are filled, with T, F, J, Fp, dT, Z,
+    M of each step, products and spectral (K, n, n) the monodromy matrix as it is and scaled, report (K, 4) of Newton's
+    method, and seen (K, 12): length tried, distance, then angle, chord, miss and motion over their limits, the next
+    length, int tr J ds, roughness, |M f - f| / |f|, whether the reading is complete (else it is the last step), whether
+    the segment is quiet.
     """
     taken, size, n = 0, points.shape[1], scales.shape[0]
     intervals, inner = Z.shape[1], Z.shape[2]
@@ -243,7 +249,7 @@ def march(  # type: ignore[no-untyped-def]
     first = (intervals + 1) * n
     count = n - own
     for k in range(M.shape[0]):  # places from a range: a literal 0 would be a type of its own, and compiled once more
-        now = past + k
+        now, row = past + k, k + 1
         step = min(length, pace[0])
         change = _predict(points, tangents, rates, steps, k, now, step, pace[1], guess)
         parameter = P[k, free] + change
@@ -279,6 +285,10 @@ def march(  # type: ignore[no-untyped-def]
         )
         seen[k, 7], seen[k, 8] = summary(M[k], J[k], h, b, leading, scales, nodes, stages, products[k])
         _scaled(products[k], S, scales, spectral[k])
+        largest = 0.0
+        for a in range(n):
+            for c in range(n):
+                largest = max(largest, abs(spectral[k, a, c]))
         seen[k, 9] = 0.0
         matrix = spectral[k]
         if own == 1:
@@ -287,11 +297,11 @@ def march(  # type: ignore[no-untyped-def]
                 f[0, a] /= scales[a]
             seen[k, 9] = _without_flow(matrix, f[0], square, other)
             matrix = square
-        if not _multipliers(by[3], matrix, count, packed, re[k + 1], im[k + 1], spare):
+        if not _multipliers(by[3], matrix, count, packed, re[row + 1], im[row + 1], spare):
             break
         seen[k, 0], seen[k, 1] = step, distance
         seen[k, 2], seen[k, 3], seen[k, 4] = angle / limits[0], chord / limits[1], miss / limits[2]
-        seen[k, 5] = _motion(re, im, k, count) / limits[3]
+        seen[k, 5] = _motion(re, im, row, count) / limits[3]
         worst = max(max(seen[k, 2], seen[k, 3]), max(seen[k, 4], seen[k, 5]))
         if not (worst <= 1.0 and 0.0 < distance <= 3.0 * step):
             break
@@ -299,8 +309,21 @@ def march(  # type: ignore[no-untyped-def]
         factor = 2.0 if worst == 0.0 else min(2.0, 0.5 / worst)
         if report[k, 1] > pace[2]:
             factor = min(factor, 1.2 if report[k, 1] == pace[2] + 1.0 else 0.7)
-        ahead = max(pace[3] * _room(re, im, k, count, before, after) * distance, pace[4] * pace[0])
+        ahead = max(pace[3] * _room(re, im, row, count, before, after) * distance, pace[4] * pace[0])
         length = min(pace[0], min(distance * max(0.4, factor), ahead))
         seen[k, 6] = length
+        signs[row + 1] = report[k, 3]
+        rounding = trust[4] * largest * n + seen[k, 9]
+        growth = seen[k, 7] * span * T[k, 0]
+        seen[k, 10] = reading(
+            re[row + 1], im[row + 1], count, known, trust, seen[k, 8], growth, orientation, rounding, readings[row + 1]
+        )
+        gap, earlier = (older[1], older[0]) if k == 0 else (steps[now], rates[max(now - 1, 0)])
+        seen[k, 11] = gap > 0.0 and quiet(
+            re, im, row, count, readings, signs, (earlier, rates[now], rates[now + 1]), (steps[now], distance), gap,
+            moved, watch,
+        )
         taken = k + 1
+        if seen[k, 10] == 0.0:
+            break  # its error is to be computed, and known to the steps that follow
     return taken

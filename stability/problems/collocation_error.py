@@ -29,11 +29,14 @@ if TYPE_CHECKING:
     from .collocation import Collocation
     from .collocation_linearisation import CollocationLinearisation, Workspace
 
-__all__ = ["carried_errors", "carried_to", "multiplier_error", "node_error", "refined"]
+__all__ = ["TRUST", "carried_errors", "carried_to", "multiplier_error", "node_error", "refined"]
 
 Array = np.ndarray
 _SINGULAR = 1e-4  # distance of a multiplier from 1 below which a step at a fixed parameter means nothing
 _HIGHEST = 11
+# a carried error: its factor, the growth up to which it is carried; distance from the circle beyond which it may be, as
+# a multiple of it and absolutely; rounding of a product of matrices
+TRUST = (3.0, 4.0, 1e3, 1e-5, 1e-15)
 
 
 def _same(a: Array, b: Array) -> bool:
@@ -118,7 +121,7 @@ def multiplier_error(
     """Change of the multipliers near the unit circle from degree m to m + 1.
 
     Where none is near the circle, but for those that are critical by construction, the change at an earlier point of
-    the same mesh is carried over, times 3 and the square of the growth of the m-th derivative (up to 2): nodes have
+    the same mesh is carried over, times 3 and the square of the growth of the m-th derivative (up to 4): nodes have
     twice the order of the polynomial.
     """
     solution, roughness = linearisation.solution, linearisation.summary[2]
@@ -127,7 +130,7 @@ def multiplier_error(
     free = values.tolist()
     for target in linearisation.critical[: len(free)]:
         free.remove(min(free, key=lambda z: abs(z - target)))
-    if min((abs(abs(z) - 1) for z in free), default=1.0) > 1e3 * carried + 1e-5:
+    if min((abs(abs(z) - 1) for z in free), default=1.0) > TRUST[2] * carried + TRUST[3]:
         return carried
     step = refined(problem, solution, linearisation.solution_params)
     if step is None:
@@ -149,9 +152,9 @@ def carried_errors(problem: Collocation, u: Array, roughness: float | None = Non
     if roughness is None:
         roughness = _roughness(problem, u)
     growth = roughness / known[2] if known[2] > 0 else math.inf
-    if not 0 < growth < 2:
+    if not 0 < growth < TRUST[1]:
         return math.inf, math.inf
-    factor = 3 * max(1.0, growth) ** 2
+    factor = TRUST[0] * max(1.0, growth) ** 2
     return factor * known[0], factor * known[1]
 
 

@@ -7,13 +7,16 @@ Python.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..kernels import marching
-from ..protocols import Corrected, Stretch, Stride, Tangent
+from ..protocols import Corrected, Spectrum, Stretch, Stride, Tangent
+from ..words import Verdict
+from .collocation_error import TRUST
 from .collocation_linearisation import CollocationLinearisation, Workspace
 
 if TYPE_CHECKING:
@@ -21,48 +24,75 @@ if TYPE_CHECKING:
 
 __all__ = ["strides"]
 
+Array = np.ndarray
 _ITERATIONS = 8
+_VERDICTS = {1.0: Verdict.STABLE, -1.0: Verdict.UNSTABLE}
 
 
 def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
     """The steps of `protocols.Problem.strides`; none where the first one is to be looked at by itself."""
     mesh, flow, K = problem.mesh, problem.flow, ahead.most
     rule, N, n, m, own = mesh.rule, mesh.intervals, mesh.n, len(ahead.params), mesh.own
-    if len(ahead.values) != n - own:  # a point without a spectrum of its own
+    if len(ahead.spectra[0].values) != n - own:  # a point without a spectrum of its own
         return
     past, size, index, count = len(ahead.tangents) - 1, mesh.size, problem.index(ahead.free), N * mesh.degree
     P, points = np.empty((K + 1, m)), np.empty((K + 1, size))
     tangents, rates, lengths = np.empty((past + K + 1, size)), np.empty(past + K + 1), np.empty(past + K + 1)
-    re, im = np.empty((K + 1, n)), np.empty((K + 1, n))
-    P[0], points[0], re[0, : n - own], im[0, : n - own] = ahead.params, ahead.u, ahead.values.real, ahead.values.imag
+    re, im, readings, signs = np.empty((K + 2, n)), np.empty((K + 2, n)), np.empty((K + 2, 9)), np.empty(K + 2)
+    P[0], points[0] = ahead.params, ahead.u
     for row, (t, step) in enumerate(zip(reversed(ahead.tangents), reversed(ahead.steps))):
         tangents[row], rates[row], lengths[row] = t.u, t.parameter, step
+    comparable = _known(problem, ahead, re, im, readings, signs)
     F, J, Fp = np.empty((K, count, n)), np.empty((K, count, n, n)), np.empty((K, count, n, m))
     T, dT, Z, M = np.zeros((K, 1)), np.zeros((K, m)), np.empty((K, N, mesh.degree * n, n)), np.empty((K, N, n, n))
-    x, report, seen = np.empty((K, 2, size + 1)), np.empty((K, 4)), np.empty((K, 10))
+    x, report, seen = np.empty((K, 2, size + 1)), np.empty((K, 4)), np.empty((K, 12))
     small = mesh.degree * len(problem.kept)
     LU, pivots = np.empty((0, small, small)), np.empty((0, small), np.int64)
     products, spectral, weight = np.empty((K, n, n)), np.empty((K, n, n)), ahead.tangents[0].weight
+    level = problem._memo.get("level")
+    error = (math.inf, 0.0) if level is None or problem.kinked else (float(level[0]), float(level[2]))
     taken = marching.march(
         marching.addresses(), flow.address, flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse,
         rule.matrix, rule.row_sums, rule.update, rule.weights, rule.leading, problem.kept, problem.position,
         problem.closure, problem.winding, problem.scales, problem.weights, problem.quadrature, ahead.tolerance,
-        _ITERATIONS, index, own, past, weight, ahead.window, ahead.limits, ahead.pace, ahead.length,
-        P, points, tangents, rates, lengths, re, im, T, F, J, Fp, dT, LU, pivots, Z, M, x, products, spectral, report,
-        seen,
+        _ITERATIONS, index, own, past, weight, ahead.window, ahead.limits, ahead.pace, ahead.watch,
+        ahead.older if comparable else (0.0, 0.0), error, TRUST, problem.orientation, ahead.length,
+        P, points, tangents, rates, lengths, re, im, readings, signs, T, F, J, Fp, dT, LU, pivots, Z, M, x, products,
+        spectral, report, seen,
     )  # fmt: skip
     for k in range(taken):
-        work: Workspace = object.__new__(Workspace)
-        work.F, work.J, work.Fp, work.T, work.dT = F[k], J[k], Fp[k], T[k], dT[k]
-        work.LU, work.pivots, work.Z, work.M = LU, pivots, Z[k], M[k]
         u, params = points[k + 1], P[k + 1]
         tangent = Tangent(tangents[past + k + 1], float(rates[past + k + 1]), weight)
         _, iterations, residual, sign = report[k].tolist()
-        L = CollocationLinearisation(problem, u, params, work, sign, (x[k, 0, :size], float(x[k, 0, size]), index))
-        *judged, trace, roughness, trivial = seen[k].tolist()
         values = np.empty(n - own, complex)
-        values.real, values.imag = re[k + 1, : n - own], im[k + 1, : n - own]
-        vars(L).update(summary=(products[k], trace, roughness), spectral=spectral[k], nontrivial=(values, trivial))
+        values.real, values.imag = re[k + 2, : n - own], im[k + 2, : n - own]
+        *seven, trace, rough, trivial, complete, quiet = seen[k].tolist()
+        tried, distance, angle, chord, missed, motion, following = seven
         problem._memo["tangent"] = (u, index, tangent)
+        L = spectrum = tests = None
+        if complete:
+            error_of, verdict, unstable, plus, minus, pairs, *three = readings[k + 2].tolist()
+            spectrum = Spectrum(values, error_of, int(unstable), int(plus), int(minus), int(pairs), _VERDICTS[verdict])
+            tests = tuple(three)
+        else:
+            work: Workspace = object.__new__(Workspace)
+            work.F, work.J, work.Fp, work.T, work.dT = F[k], J[k], Fp[k], T[k], dT[k]
+            work.LU, work.pivots, work.Z, work.M = LU, pivots, Z[k], M[k]
+            correction = (x[k, 0, :size], float(x[k, 0, size]), index)
+            L = CollocationLinearisation(problem, u, params, work, sign, correction)
+            vars(L).update(summary=(products[k], trace, rough), spectral=spectral[k], nontrivial=(values, trivial))
         found = Corrected(u, params, tangent, residual, int(iterations), int(sign), L, True)
-        yield Stride(found, *judged)
+        yield Stride(
+            found, tried, distance, angle, chord, missed, motion, following, spectrum, tests, bool(quiet)
+        )
+
+
+def _known(problem: Collocation, ahead: Stretch, re: Array, im: Array, readings: Array, signs: Array) -> bool:
+    """Fill what is known of the point before (row 0) and of the last point (row 1); whether there is one before."""
+    count = len(ahead.spectra[0].values)
+    for row, spectrum, tests, sign in zip((1, 0), ahead.spectra, ahead.tests, ahead.signs):
+        if len(spectrum.values) != count:
+            return False
+        re[row, :count], im[row, :count], signs[row] = spectrum.values.real, spectrum.values.imag, sign
+        readings[row, 2:] = (spectrum.unstable, spectrum.beyond_plus, spectrum.beyond_minus, spectrum.pairs, *tests)
+    return len(ahead.spectra) == 2

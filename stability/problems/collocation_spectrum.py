@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..protocols import Spectrum
-from .collocation_error import multiplier_error
+from .collocation_error import TRUST, multiplier_error
 from .collocation_kinks import kink_error
 from .orbit_spectrum import contracted, deflated, eigenvalues, liouville_gap, orbit_spectrum
 
@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["collocation_spectrum", "growth_of_volume"]
 
-Array = np.ndarray
-_ROUNDING = 1e-15
 
 
 def collocation_spectrum(problem: Collocation, linearisation: CollocationLinearisation) -> Spectrum:
@@ -38,7 +36,7 @@ def collocation_spectrum(problem: Collocation, linearisation: CollocationLineari
         matrix, error = (M, 0.0) if direction is None else deflated(M, direction)
         known = eigenvalues(matrix), error
     values, error = known
-    error += multiplier_error(problem, linearisation, values, direction) + _ROUNDING * largest * len(M)
+    error += multiplier_error(problem, linearisation, values, direction) + TRUST[4] * largest * len(M)
     if problem.kinked:
         error += kink_error(problem, linearisation, values)
     factors = linearisation.work.M
