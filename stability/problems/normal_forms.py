@@ -190,8 +190,10 @@ def _torus(forms: Forms) -> NormalForm:
     if any(abs(mu**k - 1) < _RESONANT for k in (1, 2, 3, 4)):
         return NormalForm(None, None)
     p, q = _critical_vectors(A, mu)
-    c = np.conj(q)
-    still = np.linalg.solve(eye - A, np.real(forms.second(q, c)))
-    twice = np.linalg.solve(mu**2 * eye - A, forms.second(q, q))
-    terms = [p @ forms.third(q, q, c), 2 * (p @ forms.second(q, still)), p @ forms.second(c, twice)]
+    terms = forms.torus_terms(p, q, mu) if hasattr(forms, "torus_terms") else None
+    if terms is None:
+        c = np.conj(q)
+        still = np.linalg.solve(eye - A, np.real(forms.second(q, c)))
+        twice = np.linalg.solve(mu**2 * eye - A, forms.second(q, q))
+        terms = (p @ forms.third(q, q, c), 2 * (p @ forms.second(q, still)), p @ forms.second(c, twice))
     return _judged(np.real(np.array(terms) / mu) / 2, forms, q, 1)

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ..kernels.bordering import lapack
 from ..kernels.condensation_cubic import cubic_terms
-from ..kernels.condensation_sweeps import sweeps
+from ..kernels.condensation_sweeps import adjoint_sweep, sweeps
 
 __all__ = ["MapForms"]
 
@@ -55,16 +55,21 @@ class MapForms:
             self.sizes = np.ones(self.n - 1)  # of the section's coordinates, which mix states
 
     # ------------------------------------------------------------------ jets along a line
+    def _derivatives(self, *groups: tuple[Array, ...]) -> Array:
+        """f_xx or f_xxx of groups of two or three variations (count, n) at the stages: (groups, count, n)."""
+        L, many = self.L, len(groups)
+        states = self.states.reshape(-1, self.n)
+        directions = np.zeros((len(groups[0]), many * len(states), self.n + len(L.params)))
+        for k, vectors in enumerate(zip(*groups)):
+            directions[k, :, : self.n] = np.concatenate(vectors)
+        evaluations = L.problem.evaluations
+        function = evaluations.second if len(directions) == 2 else evaluations.third
+        found = function(np.tile(L.mesh.phase, many), np.tile(states, (many, 1)), L.params, *directions)
+        return np.asarray(found).reshape(many, -1, self.n)
+
     def _derivative(self, *vectors: Array) -> Array:
-        """f_xx or f_xxx of variations (count, n) at the stages."""
-        evaluations, L = self.L.problem.evaluations, self.L
-        function = evaluations.second if len(vectors) == 2 else evaluations.third
-        directions = []
-        for v in vectors:
-            direction = np.zeros((len(v), self.n + len(L.params)))
-            direction[:, : self.n] = v
-            directions.append(direction)
-        return np.asarray(function(L.mesh.phase, self.states.reshape(-1, self.n), L.params, *directions))
+        """The same of one group."""
+        return np.asarray(self._derivatives(vectors)[0])
 
     def _sweep(self, start: Array, forcing: Array | None) -> tuple[Array, Array]:
         """(end (n,), stages (count, n)) of the variation from `start` with f's inhomogeneity `forcing` (count, n)."""
@@ -136,6 +141,45 @@ class MapForms:
             np.ascontiguousarray(q), mesh.phase, self.states, L.params, L.sizes, terms,
         )  # fmt: skip
         return float(terms[0]), float(terms[1])
+
+    def torus_terms(self, p: Any, q: Any, mu: complex) -> tuple[complex, complex, complex] | None:
+        """p.C(q, q, q*), 2 p.B(q, h), p.B(q*, k), (I - A) h = B(q, q*), (mu^2 - A) k = B(q, q); None on a section.
+
+        With the variations V, W0, W2, H, K of q, f_xx[V, V*], f_xx[V, V], h and k they are sums over the stages of
+        f_xxx[V, V, V*] + 2 f_xx[V, W0] + f_xx[V*, W2], of 2 f_xx[V, H] and of f_xx[V*, K], by the adjoint sweep from p.
+        """
+        if self.own:
+            return None
+        eye, zero = np.eye(self.n), np.zeros(self.n)
+        a, b = (self._sweep(self.scales * part, None)[1] for part in (q.real, q.imag))
+        aa, ab, bb = self._derivatives((a, a), (a, b), (b, b))
+        (end, still), (end_2, W2) = self._sweep(zero, aa + bb), self._complex(zero, aa - bb + 2j * ab)
+        h = np.linalg.solve(eye - self.matrix, self._returned(end))
+        k = np.linalg.solve(mu**2 * eye - self.matrix, self._returned(end_2))
+        H, (_, K) = self._sweep(self.scales * h, None)[1], self._complex(self.scales * k, None)
+        pairs = [(x, y) for y in (still, H, W2.real, W2.imag, K.real, K.imag) for x in (a, b)]
+        Va, Vb, Ha, Hb, ra, rb, ia, ib, ka, kb, la, lb = self._derivatives(*pairs)
+        aaa, aab, abb, bbb = self._derivatives((a, a, a), (a, a, b), (a, b, b), (b, b, b))
+        cubic = aaa + abb + 1j * (aab + bbb) + 2 * (Va + 1j * Vb) + ra + ib + 1j * (ia - rb)
+        weighted = self._adjoint(p.real) + 1j * self._adjoint(p.imag)
+        terms = (cubic, 2 * (Ha + 1j * Hb), ka + lb + 1j * (la - kb))
+        first, second, third = (complex((weighted * term).sum()) for term in terms)
+        return first, second, third
+
+    def _complex(self, start: Any, forcing: Any) -> tuple[Any, Any]:
+        """`_sweep` of a complex variation, by its parts."""
+        parts = [
+            self._sweep(take(start), None if forcing is None else take(forcing)) for take in (np.real, np.imag)
+        ]
+        return parts[0][0] + 1j * parts[1][0], parts[0][1] + 1j * parts[1][1]
+
+    def _adjoint(self, p: Array) -> Array:
+        """(count, n): p . (end of the variation from zero with inhomogeneity g) is the sum of this times g."""
+        L, mesh = self.L, self.L.mesh
+        none = np.zeros((mesh.intervals, mesh.degree * self.n))
+        omega, eta = np.empty_like(none), np.linalg.solve(L.problem.closure.T, p / self.scales)
+        adjoint_sweep(*L.factors(), mesh.rule.update, mesh.rule.row_sums, none, eta, omega)
+        return np.asarray(L.sigma * (omega * mesh.h[:, None]).reshape(-1, self.n))
 
     # ------------------------------------------------------------------ multilinear forms
     def second(self, x: Any, y: Any) -> Any:

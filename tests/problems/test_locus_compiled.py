@@ -145,3 +145,19 @@ def test_cubic_terms_by_one_pass_are_those_of_the_multilinear_forms(case):
     assert abs(wanted[0]) > 1e-6
     zero = forms.cubic_terms(p, 0 * q)
     assert zero == (0.0, 0.0)
+
+
+def test_torus_terms_by_one_pass_are_those_of_the_multilinear_forms():
+    point, _ = case_of("torus")
+    forms = MapForms(point.problem.linearise(point.u, point.params_vector))
+    A, eye = forms.matrix, np.eye(forms.n)
+    values, right = np.linalg.eig(A)
+    at = int(np.argmin(np.abs(np.abs(values) - 1) + 10 * (values.imag <= 0)))
+    mu_, q = values[at], right[:, at]
+    left = np.linalg.inv(right)[at]
+    h = np.linalg.solve(eye - A, np.real(forms.second(q, q.conj())))
+    twice = np.linalg.solve(mu_**2 * eye - A, forms.second(q, q))
+    wanted = left @ forms.third(q, q, q.conj()), 2 * left @ forms.second(q, h), left @ forms.second(q.conj(), twice)
+    got = forms.torus_terms(left, q, mu_)
+    assert np.abs(np.array(got) - np.array(wanted)).max() < 1e-9 * np.abs(wanted).max()
+    assert min(np.abs(wanted)) > 1e-6
