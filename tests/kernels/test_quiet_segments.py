@@ -115,7 +115,7 @@ def random_triple(rng, count):
 
 def sees_something(points):
     """Whether the driver would look at the segment between the last two of three points."""
-    before, a, b = points
+    _, a, b = points
     if not events.changes(a, b).nothing or events.changes(a, b).collision or events.double_turn(a, b) is not None:
         return True
     triples = events.matched(points)
