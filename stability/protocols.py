@@ -95,7 +95,8 @@ class Stretch(NamedTuple):
     The last point (u, params), its tangent and those before it (latest first, on the same mesh) with the lengths of the
     steps that led to them; spectra, test functions and signs of determinants of it and of the point before, on any
     mesh; `older`: that one's rate of the parameter, and the arclength from it. `length` of the first step to try, at
-    most `most` steps, each inside the `window` of the parameter. `limits` (angle, chord, miss, motion), `pace` (longest
+    most `most` steps, each inside the `window` of the parameter; the mesh is adapted after `rest` of them, and after
+    each `every` more, where it needs to be. `limits` (angle, chord, miss, motion), `pace` (longest
     step, far, few, approach, creep) and `watch` (dip, fall, turn) are the driver's constants.
     """
 
@@ -110,6 +111,8 @@ class Stretch(NamedTuple):
     older: tuple[float, float]
     length: float
     most: int
+    rest: int
+    every: int
     window: tuple[float, float]
     tolerance: float
     limits: tuple[float, float, float, float]
@@ -120,8 +123,8 @@ class Stretch(NamedTuple):
 class Stride(NamedTuple):
     """One plainly good step: the point, the length tried, its distance, and what is left of the limits (at most 1).
 
-    The spectrum and its test functions, where nothing about them is in doubt (else this is the last step of a stretch);
-    quiet: nothing can have happened on the way.
+    The spectrum and its test functions, where nothing about them is in doubt; quiet: nothing can have happened on the
+    way; rests: the mesh need not be adapted now. A stretch ends with a step that is in doubt or not at rest.
     """
 
     found: Corrected
@@ -135,6 +138,7 @@ class Stride(NamedTuple):
     spectrum: Spectrum | None
     tests: tuple[float, float, float] | None
     quiet: bool
+    rests: bool
 
 
 class Seed(NamedTuple):

@@ -174,11 +174,11 @@ class Follower(Iterator[Point]):
     def _try(self, h: float) -> tuple[Point, Comparison] | float:
         """An accepted point, or the factor by which to shorten the step."""
         settings, last = self.settings, self.last
-        stride = self._strides.step(last, self._past, h, _ADAPT_EVERY - self.since_adapt)
+        stride = self._strides.step(last, self._past, h, _ADAPT_EVERY - self.since_adapt, _ADAPT_EVERY)
         if stride is not None:
             point = strode(last, stride, settings.index)
             if point is not None:
-                return point, Comparison(*stride[2:8], quiet=stride.quiet)
+                return point, Comparison(*stride[2:8], quiet=stride.quiet, rests=stride.rests)
         u, parameter = predict(last, self._past, h)
         landed = self._landed(parameter, u, h)
         if landed is not None:
@@ -261,7 +261,10 @@ class Follower(Iterator[Point]):
             self._broken(failure)
         self.since_adapt += 1
         if self.since_adapt >= _ADAPT_EVERY and self.status is None:
-            self._adapt()
+            if seen.rests:
+                self.since_adapt = 0
+            else:
+                self._adapt()
 
     def _close(self, loop: float) -> None:
         """End the branch where it began: what was followed a second time is dropped, the first point closes it."""

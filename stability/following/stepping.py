@@ -67,6 +67,7 @@ class Comparison(NamedTuple):
     motion: float
     following: float | None = None  # the next length, where it is known already
     quiet: bool = False  # nothing can have happened on the way
+    rests: bool = False  # the mesh need not be adapted now
 
     @property
     def worst(self) -> float:

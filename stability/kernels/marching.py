@@ -24,7 +24,7 @@ from stability.kernels.addresses import call_eigenvalues, call_field, eigenvalue
 from stability.kernels.caching import kernel
 from stability.kernels.condensation_newton import NEWTON, newton, solvers
 from stability.kernels.condensation_reduced import summary
-from stability.kernels.quiet_segments import quiet, reading
+from stability.kernels.quiet_segments import carried, quiet, reading
 
 __all__ = ["addresses", "march"]
 
@@ -71,21 +71,25 @@ def _predict(points, tangents, rates, steps, k, now, h, far, guess):  # type: ig
 
 @kernel(inline=True)
 def _scaled(product, S, scales, M):  # type: ignore[no-untyped-def]
-    """M = D^-1 S^-1 Phi D, S^-1 = S^T."""
-    n = scales.shape[0]
+    """M = D^-1 S^-1 Phi D, S^-1 = S^T; returns its largest entry."""
+    n, largest = scales.shape[0], 0.0
     for a in range(n):
         for b in range(n):
             value = 0.0
             for c in range(n):
                 value += S[c, a] * product[c, b]
             M[a, b] = value * scales[b] / scales[a]
+            largest = max(largest, abs(M[a, b]))
+    return largest
 
 
 @kernel(inline=True)
-def _without_flow(M, f, A, B):  # type: ignore[no-untyped-def]
-    """A (n - 1, n - 1): M without the direction f, by reflection on the first axis; returns |M f - f| / |f|."""
+def _without_flow(M, f, scales, A, B):  # type: ignore[no-untyped-def]
+    """A (n - 1, n - 1): M without the direction f / scales, by reflection on the first axis; |M f - f| / |f|."""
     n = M.shape[0]
     size = gap = 0.0
+    for a in range(n):
+        f[a] /= scales[a]
     for a in range(n):
         value = -f[a]
         for b in range(n):
@@ -221,11 +225,60 @@ def _compare(weights, weight, points, tangents, rates, guess, k, now, change, mi
     return distance, angle, chord, np.sqrt(missed + w2 * miss * miss) / distance
 
 
+@kernel(inline=True)
+def _rests(own, stages, period, scales, smallest, units, period_scale, error, band):  # type: ignore[no-untyped-def]
+    """Whether `problems/orbit_adaption.py` would leave scales and mesh alone: the nodes' error lies in the band."""
+    n = scales.shape[0]
+    if not band[0] <= error <= band[1] or (own == 1 and not 0.5 <= period / period_scale <= 2.0):
+        return False
+    largest = 0.0
+    for a in range(n):
+        size = 0.0
+        for j in range(stages.shape[0]):
+            for i in range(a, stages.shape[1], n):
+                size = max(size, abs(stages[j, i]))
+        largest = max(largest, size / units[a])
+    if not 0.0 < largest < np.inf:
+        return False
+    for a in range(n):
+        size = 0.0
+        for j in range(stages.shape[0]):
+            for i in range(a, stages.shape[1], n):
+                size = max(size, abs(stages[j, i]))
+        wanted = max(size, smallest[a]) if size > 1e-6 * largest * units[a] else min(largest, 1.0) * units[a]
+        if not 0.5 <= wanted / scales[a] <= 2.0:
+            return False
+    return True
+
+
+@kernel(inline=True)
+def _next_length(distance, worst, iterations, pace, room):  # type: ignore[no-untyped-def]
+    """`stepping.next_length`; room: in steps like the last one."""
+    factor = 2.0 if worst == 0.0 else min(2.0, 0.5 / worst)
+    if iterations > pace[2]:
+        factor = min(factor, 1.2 if iterations == pace[2] + 1.0 else 0.7)
+    ahead = max(pace[3] * room * distance, pace[4] * pace[0])
+    return min(pace[0], min(distance * max(0.4, factor), ahead))
+
+
+@kernel(inline=True)
+def _normalised(weights, weight, x, t):  # type: ignore[no-untyped-def]
+    """t = the unit tangent along x (u, parameter); returns the rate of the parameter."""
+    size = weights.shape[0]
+    total = (weight * x[size]) ** 2
+    for a in range(size):
+        total += weights[a] * x[a] * x[a]
+    total = np.sqrt(total)
+    for a in range(size):
+        t[a] = x[a] / total
+    return x[size] / total
+
+
 @kernel
 def march(  # type: ignore[no-untyped-def]
     by, field, period, span, phase, h, W, A, row_sums, update, b, leading, kept, position, S, jump, scales, weights,
     stage_weights, tolerance, max_iterations, free, own, past, weight, window, limits, pace, watch, older, known, trust,
-    orientation, length,
+    orientation, smallest, units, rest, length,
     P, points, tangents, rates, steps, re, im, readings, signs, T, F, J, Fp, dT, LU, pivots, Z, M, x, products,
     spectral, report, seen,
 ):  # fmt: skip
@@ -235,11 +288,13 @@ def march(  # type: ignore[no-untyped-def]
     (past + 1 + K, N), rates and steps its tangent and the length of the step to it, earlier ones before; row 1 of re,
     im (K + 2, n), readings (K + 2, 9) and signs its multipliers, row 0 those of the point before, `older` that point's
     rate and the arclength from it (0: there is none). limits : of angle, chord, miss, motion; pace : longest step, far,
-    few, approach, creep; watch, known, trust : see quiet_segments. The rows behind are filled, with T, F, J, Fp, dT, Z,
-    M of each step, products and spectral (K, n, n) the monodromy matrix as it is and scaled, report (K, 4) of Newton's
-    method, and seen (K, 12): length tried, distance, then angle, chord, miss and motion over their limits, the next
-    length, int tr J ds, roughness, |M f - f| / |f|, whether the reading is complete (else it is the last step), whether
-    the segment is quiet.
+    few, approach, creep; watch, trust, and the first and last of known : see quiet_segments; known[1] : error of the
+    nodes; smallest, units : sizes of states; rest : period's scale, band of the nodes' error, steps to the next
+    adaption and between adaptions. The rows behind are filled, with T, F, J, Fp, dT, Z, M of each step, products and
+    spectral (K, n, n) the monodromy matrix as it is and scaled, report (K, 4) of Newton's method, and seen (K, 13):
+    length tried, distance, then angle, chord, miss and motion over their limits, the next length, int tr J ds,
+    roughness, |M f - f| / |f|, whether the reading is complete (else it is the last step), whether the segment is
+    quiet, whether the mesh may rest (else a step after which it is to be adapted is the last one).
     """
     taken, size, n = 0, points.shape[1], scales.shape[0]
     intervals, inner = Z.shape[1], Z.shape[2]
@@ -247,10 +302,9 @@ def march(  # type: ignore[no-untyped-def]
     square, other, packed = np.empty((n, n)), np.empty((n, n)), np.empty(n * n)
     before, after, spare = np.empty(n + 2), np.empty(n + 2), np.empty(12 * n)
     first = (intervals + 1) * n
-    count = n - own
+    count, due = n - own, rest[3]
     for k in range(M.shape[0]):  # places from a range: a literal 0 would be a type of its own, and compiled once more
-        now, row = past + k, k + 1
-        step = min(length, pace[0])
+        now, row, step = past + k, k + 1, min(length, pace[0])
         change = _predict(points, tangents, rates, steps, k, now, step, pace[1], guess)
         parameter = P[k, free] + change
         if not window[0] <= parameter <= window[1]:
@@ -269,33 +323,19 @@ def march(  # type: ignore[no-untyped-def]
             t[first : first + intervals * inner].reshape((intervals, inner)), rates[now], weight, 0.0, tolerance,
             max_iterations, F[k], J[k], Fp[k], dT[k], LU, pivots, Z[k], M[k], x[k], report[k],
         ))  # fmt: skip
-        parameter = P[k + 1, free]
-        if status != 0.0 or not window[0] <= parameter <= window[1]:
+        moved = P[k + 1, free] - P[k, free]
+        if status != 0.0 or not window[0] <= P[k + 1, free] <= window[1]:
             break
-        total = (weight * x[k, 1, size]) ** 2
-        for a in range(size):
-            total += weights[a] * x[k, 1, a] * x[k, 1, a]
-        total = np.sqrt(total)
-        for a in range(size):
-            tangents[now + 1, a] = x[k, 1, a] / total
-        rates[now + 1] = x[k, 1, size] / total
-        moved = parameter - P[k, free]
+        rates[now + 1] = _normalised(weights, weight, x[k, 1], tangents[now + 1])
         distance, angle, chord, miss = _compare(
             weights, weight, points, tangents, rates, guess, k, now, moved, moved - change
         )
-        seen[k, 7], seen[k, 8] = summary(M[k], J[k], h, b, leading, scales, nodes, stages, products[k])
-        _scaled(products[k], S, scales, spectral[k])
-        largest = 0.0
-        for a in range(n):
-            for c in range(n):
-                largest = max(largest, abs(spectral[k, a, c]))
-        seen[k, 9] = 0.0
-        matrix = spectral[k]
+        trace, rough = summary(M[k], J[k], h, b, leading, scales, nodes, stages, products[k])
+        matrix, gap = spectral[k], 0.0
+        largest = _scaled(products[k], S, scales, matrix)
         if own == 1:
             call_field(field, 1, phase, nodes, P[k + 1], 0, f, other, column)
-            for a in range(n):
-                f[0, a] /= scales[a]
-            seen[k, 9] = _without_flow(matrix, f[0], square, other)
+            gap = _without_flow(matrix, f[0], scales, square, other)
             matrix = square
         if not _multipliers(by[3], matrix, count, packed, re[row + 1], im[row + 1], spare):
             break
@@ -306,24 +346,25 @@ def march(  # type: ignore[no-untyped-def]
         if not (worst <= 1.0 and 0.0 < distance <= 3.0 * step):
             break
         steps[now + 1] = distance
-        factor = 2.0 if worst == 0.0 else min(2.0, 0.5 / worst)
-        if report[k, 1] > pace[2]:
-            factor = min(factor, 1.2 if report[k, 1] == pace[2] + 1.0 else 0.7)
-        ahead = max(pace[3] * _room(re, im, row, count, before, after) * distance, pace[4] * pace[0])
-        length = min(pace[0], min(distance * max(0.4, factor), ahead))
-        seen[k, 6] = length
+        length = _next_length(distance, worst, report[k, 1], pace, _room(re, im, row, count, before, after))
+        seen[k, 6], seen[k, 7], seen[k, 8], seen[k, 9] = length, trace, rough, gap
         signs[row + 1] = report[k, 3]
-        rounding = trust[4] * largest * n + seen[k, 9]
-        growth = seen[k, 7] * span * T[k, 0]
+        factor = carried(known[2], rough, trust)
         seen[k, 10] = reading(
-            re[row + 1], im[row + 1], count, known, trust, seen[k, 8], growth, orientation, rounding, readings[row + 1]
+            re[row + 1], im[row + 1], count, factor * known[0], trust, trace * span * T[k, 0], orientation,
+            trust[4] * largest * n + gap, readings[row + 1],
         )
-        gap, earlier = (older[1], older[0]) if k == 0 else (steps[now], rates[max(now - 1, 0)])
-        seen[k, 11] = gap > 0.0 and quiet(
-            re, im, row, count, readings, signs, (earlier, rates[now], rates[now + 1]), (steps[now], distance), gap,
+        since, earlier = (older[1], older[0]) if k == 0 else (steps[now], rates[max(now - 1, 0)])
+        seen[k, 11] = since > 0.0 and quiet(
+            re, im, row, count, readings, signs, (earlier, rates[now], rates[now + 1]), (steps[now], distance), since,
             moved, watch,
         )
-        taken = k + 1
-        if seen[k, 10] == 0.0:
-            break  # its error is to be computed, and known to the steps that follow
+        taken, due = k + 1, due - 1.0
+        seen[k, 12] = due > 0.0 or _rests(
+            own, stages, T[k, 0], scales, smallest, units, rest[0], factor * known[1], (rest[1], rest[2])
+        )
+        if seen[k, 10] == 0.0 or seen[k, 12] == 0.0:
+            break
+        if due <= 0.0:
+            due = rest[4]
     return taken

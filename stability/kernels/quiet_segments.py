@@ -17,20 +17,25 @@ import numpy as np
 
 from stability.kernels.caching import kernel
 
-__all__ = ["quiet", "reading"]
+__all__ = ["carried", "quiet", "reading"]
 
 _MOST = 6
 
 
 @kernel(inline=True)
-def reading(re, im, count, known, trust, rough, growth, orientation, rounding, out):  # type: ignore[no-untyped-def]
+def carried(known, rough, trust):  # type: ignore[no-untyped-def]
+    """By how much an error at an earlier point of the mesh, of roughness `known`, grows; infinite: it says nothing."""
+    ratio = rough / known if known > 0.0 else np.inf
+    return trust[0] * max(1.0, ratio) ** 2 if 0.0 < ratio < trust[1] else np.inf
+
+
+@kernel(inline=True)
+def reading(re, im, count, carried, trust, growth, orientation, rounding, out):  # type: ignore[no-untyped-def]
     """Fill out (9,): error, verdict (1 stable, -1 unstable), unstable, beyond +1, beyond -1, pairs, three tests.
 
-    known : (error, roughness) at an earlier point of the mesh, an infinite error if there is none; rough : roughness
-    here; growth : int tr J dt; rounding : of the product. False where the error has to be computed.
+    carried : error of the multipliers by the mesh, infinite if it is not known; growth : int tr J dt; rounding : of the
+    product. False where the error has to be computed.
     """
-    ratio = rough / known[1] if known[1] > 0.0 else np.inf
-    carried = trust[0] * max(1.0, ratio) ** 2 * known[0] if 0.0 < ratio < trust[1] else np.inf
     near, largest, smallest, product = np.inf, 1.0, np.inf, 1.0
     plus = minus = pairs = 0
     for i in range(count):

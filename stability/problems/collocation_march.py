@@ -18,6 +18,7 @@ from ..protocols import Corrected, Spectrum, Stretch, Stride, Tangent
 from ..words import Verdict
 from .collocation_error import TRUST
 from .collocation_linearisation import CollocationLinearisation, Workspace
+from .orbit_adaption import resting
 
 if TYPE_CHECKING:
     from .collocation import Collocation
@@ -45,18 +46,21 @@ def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
     comparable = _known(problem, ahead, re, im, readings, signs)
     F, J, Fp = np.empty((K, count, n)), np.empty((K, count, n, n)), np.empty((K, count, n, m))
     T, dT, Z, M = np.zeros((K, 1)), np.zeros((K, m)), np.empty((K, N, mesh.degree * n, n)), np.empty((K, N, n, n))
-    x, report, seen = np.empty((K, 2, size + 1)), np.empty((K, 4)), np.empty((K, 12))
+    x, report, seen = np.empty((K, 2, size + 1)), np.empty((K, 4)), np.empty((K, 13))
     small = mesh.degree * len(problem.kept)
     LU, pivots = np.empty((0, small, small)), np.empty((0, small), np.int64)
     products, spectral, weight = np.empty((K, n, n)), np.empty((K, n, n)), ahead.tangents[0].weight
     level = problem._memo.get("level")
-    error = (math.inf, 0.0) if level is None or problem.kinked else (float(level[0]), float(level[2]))
+    known = (math.inf, math.inf, 0.0) if level is None or problem.kinked else tuple(map(float, level))
+    smallest, units, low, high = resting(problem, float(ahead.u[-1]) if own else problem.orbit_period(ahead.params))
+    rest = problem.period_scale, low, high, float(ahead.rest), float(ahead.every)
     taken = marching.march(
         marching.addresses(), flow.address, flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse,
         rule.matrix, rule.row_sums, rule.update, rule.weights, rule.leading, problem.kept, problem.position,
         problem.closure, problem.winding, problem.scales, problem.weights, problem.quadrature, ahead.tolerance,
         _ITERATIONS, index, own, past, weight, ahead.window, ahead.limits, ahead.pace, ahead.watch,
-        ahead.older if comparable else (0.0, 0.0), error, TRUST, problem.orientation, ahead.length,
+        ahead.older if comparable else (0.0, 0.0), known, TRUST, problem.orientation, smallest, units, rest,
+        ahead.length,
         P, points, tangents, rates, lengths, re, im, readings, signs, T, F, J, Fp, dT, LU, pivots, Z, M, x, products,
         spectral, report, seen,
     )  # fmt: skip
@@ -66,7 +70,7 @@ def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
         _, iterations, residual, sign = report[k].tolist()
         values = np.empty(n - own, complex)
         values.real, values.imag = re[k + 2, : n - own], im[k + 2, : n - own]
-        *seven, trace, rough, trivial, complete, quiet = seen[k].tolist()
+        *seven, trace, rough, trivial, complete, quiet, rests = seen[k].tolist()
         tried, distance, angle, chord, missed, motion, following = seven
         problem._memo["tangent"] = (u, index, tangent)
         L = spectrum = tests = None
@@ -83,7 +87,7 @@ def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
             vars(L).update(summary=(products[k], trace, rough), spectral=spectral[k], nontrivial=(values, trivial))
         found = Corrected(u, params, tangent, residual, int(iterations), int(sign), L, True)
         yield Stride(
-            found, tried, distance, angle, chord, missed, motion, following, spectrum, tests, bool(quiet)
+            found, tried, distance, angle, chord, missed, motion, following, spectrum, tests, bool(quiet), bool(rests)
         )
 
 

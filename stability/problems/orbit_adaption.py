@@ -30,11 +30,12 @@ if TYPE_CHECKING:
     from ..systems.system import System
     from .collocation import Collocation
 
-__all__ = ["adapted", "natural_sizes", "state_scales"]
+__all__ = ["adapted", "natural_sizes", "resting", "state_scales"]
 
 Array = np.ndarray
 _UNEVEN = 1.5  # largest share of the monitor over the mean share that is left alone
 _FINE = 1e-2  # part of the wanted accuracy below which nobody minds where the intervals are
+_COARSE = 1e-5  # part of it below which fewer intervals will do
 _TINY = 1e-6
 _LOST = 30.0  # errors below so many times their rounding do not ask for more intervals
 _ANGLE = 0.02  # rad
@@ -131,6 +132,21 @@ def adapted(
     return new, moved_u, Tangent(moved_t, tangent.parameter, tangent.weight)
 
 
+def resting(problem: Collocation, period: float) -> tuple[Array, Array, float, float]:
+    """What a march needs to know whether `adapted` would say None: sizes (see `Natural`), and a band of node errors.
+
+    The band is empty where the mesh has to follow breaks.
+    """
+    natural = natural_sizes(problem.system, period)
+    low, high = 0.0, np.inf
+    if problem.system.breaks or problem.mirror is not None:
+        low, high = 1.0, 0.0
+    elif problem.adaptive:
+        low = 0.0 if problem.intervals >= problem.mesh.intervals else _COARSE * problem.accuracy
+        high = _FINE * problem.accuracy
+    return np.asarray(natural.smallest), np.asarray(natural.units), low, high
+
+
 def _fit(scales: Array, size: Array, natural: Natural) -> bool:
     """Whether the scales are within a factor of 2 of those that the largest moduli `size` (n,) ask for."""
     sizes, smallest, units = size.tolist(), np.asarray(natural.smallest).tolist(), np.asarray(natural.units).tolist()
@@ -157,7 +173,7 @@ def _rounding(problem: Collocation, u: Array, params: Array) -> float:
 def _wanted_intervals(problem: Collocation, error: float) -> int:
     N = problem.mesh.intervals
     ratio = min(error / problem.accuracy, 1e12) if math.isfinite(error) else 1e3
-    if 1e-5 <= ratio <= 1.0 or (ratio < 1.0 and problem.intervals >= N):
+    if _COARSE <= ratio <= 1.0 or (ratio < 1.0 and problem.intervals >= N):
         return N
     factor = float((4.0 * ratio) ** (0.5 / problem.mesh.degree)) if ratio > 0 else 0.0
     wanted = int(np.ceil(N * min(max(factor, 2 / 3), 2.0)))

@@ -12,7 +12,7 @@ import pytest
 from stability.following import events, searching
 from stability.following.points import Point, smooth_tests
 from stability.kernels.caching import kernel
-from stability.kernels.quiet_segments import quiet, reading
+from stability.kernels.quiet_segments import carried, quiet, reading
 from stability.problems.collocation_error import TRUST
 from stability.problems.orbit_spectrum import liouville_gap, orbit_spectrum
 from stability.protocols import Critical, Spectrum, Tangent
@@ -27,7 +27,8 @@ class OnTheCircle:
 
 @kernel
 def read(re, im, count, known, trust, rough, growth, orientation, rounding, out):
-    return reading(re, im, count, known, trust, rough, growth, orientation, rounding, out)
+    error = carried(known[1], rough, trust) * known[0]
+    return reading(re, im, count, error, trust, growth, orientation, rounding, out)
 
 
 @kernel
