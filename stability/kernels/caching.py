@@ -84,14 +84,17 @@ def _sources(module: str) -> str:
     return digest.hexdigest()
 
 
-def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False, merged: bool = False) -> Any:
+def kernel(
+    function: Callable[..., Any] | None = None, *, inline: bool = False, merged: bool = False, sums: bool = False
+) -> Any:
     """Decorator: a compiled kernel with a guarded disk cache (`error_model="numpy"`: 1/0 is inf or nan).
 
     `inline=True` is for small functions that are only called by other kernels: no cache file of their own;
-    `merged=True` puts their machine code into that of their caller (many arguments, one call).
+    `merged=True` puts their machine code into that of their caller (many arguments, one call). `sums=True` lets the
+    compiler take the terms of sums in another order, several at a time.
     """
     if function is None:
-        return functools.partial(kernel, inline=inline, merged=merged)
+        return functools.partial(kernel, inline=inline, merged=merged, sums=sums)
     dispatcher = numba.njit(
         error_model="numpy",
         nogil=True,
@@ -99,6 +102,7 @@ def kernel(function: Callable[..., Any] | None = None, *, inline: bool = False, 
         no_cfunc_wrapper=True,
         no_cpython_wrapper=inline,
         forceinline=merged,
+        fastmath={"reassoc"} if sums else False,
     )(function)
     if not inline:
         with contextlib.suppress(*_EVERYTHING_A_DAMAGED_FILE_RAISES):

@@ -24,7 +24,7 @@ __all__ = ["monodromy_product", "reduce_and_solve", "summary"]
 LIMIT = 100.0  # largest entry of a product of neighbouring M_j: at most two digits are lost inside a group
 
 
-@kernel(inline=True)
+@kernel(inline=True, sums=True)
 def _gather(update, Z, X, nodes, rows, node_rows, corner):  # type: ignore[no-untyped-def]
     """Q (N, n, K), border coefficients of the nodes (q, N+1, n) and the reduced right sides of the borders (q, K)."""
     intervals, size, extra = X.shape
@@ -60,7 +60,7 @@ def _gather(update, Z, X, nodes, rows, node_rows, corner):  # type: ignore[no-un
     return Q, borders, reduced
 
 
-@kernel(inline=True)
+@kernel(inline=True, sums=True)
 def _group(M, Q, borders, reduced, ends, G):  # type: ignore[no-untyped-def]
     """Multiply the M_j of neighbouring intervals as long as the product stays moderate.
 
@@ -103,7 +103,7 @@ def _group(M, Q, borders, reduced, ends, G):  # type: ignore[no-untyped-def]
     return count
 
 
-@kernel(inline=True)
+@kernel(inline=True, sums=True)
 def _chain(G, count, ends, borders, reduced, R):  # type: ignore[no-untyped-def]
     """Eliminate the nodes between groups. R (count-1, n, 3n+K) receives the pivot rows [u_i | u_0 | u_{i+1} | z].
 
@@ -159,7 +159,7 @@ def _chain(G, count, ends, borders, reduced, R):  # type: ignore[no-untyped-def]
     return T, sign
 
 
-@kernel(inline=True)
+@kernel(inline=True, sums=True)
 def _dense(T, borders, reduced, S, end, tangent):  # type: ignore[no-untyped-def]
     """The (n+q) system in (u_0, lambda) with its right sides, rows scaled to unit size; solved in place."""
     n = S.shape[0]
@@ -197,7 +197,7 @@ def _dense(T, borders, reduced, S, end, tangent):  # type: ignore[no-untyped-def
     return D, sign
 
 
-@kernel
+@kernel(sums=True)
 def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent, out):  # type: ignore[no-untyped-def]
     """Solve the bordered system for every right-hand side.
 
@@ -273,7 +273,7 @@ def reduce_and_solve(update, Z, M, X, nodes, rows, node_rows, corner, S, tangent
     return sign * one
 
 
-@kernel(inline=True)
+@kernel(inline=True, sums=True)
 def _multiply_all(M, product, work):  # type: ignore[no-untyped-def]
     """product (n, n) = M_{N-1} .. M_0; `work` (n, n) is room for it."""
     intervals, n, _ = M.shape
@@ -292,7 +292,7 @@ def _multiply_all(M, product, work):  # type: ignore[no-untyped-def]
                 product[a, b] = work[a, b]
 
 
-@kernel
+@kernel(sums=True)
 def monodromy_product(M):  # type: ignore[no-untyped-def]
     """M_{N-1} .. M_0."""
     n = M.shape[1]
@@ -301,7 +301,7 @@ def monodromy_product(M):  # type: ignore[no-untyped-def]
     return product
 
 
-@kernel
+@kernel(sums=True)
 def summary(M, J, h, b, leading, scales, nodes, Y, product):  # type: ignore[no-untyped-def]
     """What a point of a branch is asked for: (int tr J ds, roughness), and the product M_{N-1} .. M_0.
 
