@@ -69,7 +69,8 @@ def compiled(
     iterations, residual, sign, sharp = report.tolist()
     solution = np.concatenate([x, params[other : other + 1], extra])
     found = status == kernels.CONVERGED
-    note = "" if found else "singular" if status == kernels.SINGULAR else "no convergence"
+    note = "" if found else ("singular" if status == kernels.SINGULAR else "no convergence")
+    note += "" if found else problem.evaluations.failure()
     critical = tuple(curve.targets(extra))
     L: Any = CollocationLinearisation(problem, x, params, work, sign, None, critical) if found else None
     return Corrected(solution, params, None, residual, int(iterations), 0, L, found, note), out.T, sharp == 1.0
