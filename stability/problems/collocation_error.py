@@ -34,6 +34,7 @@ __all__ = ["TRUST", "carried_errors", "carried_to", "multiplier_error", "node_er
 Array = np.ndarray
 _SINGULAR = 1e-4  # distance of a multiplier from 1 below which a step at a fixed parameter means nothing
 _HIGHEST = 11
+_ALIKE = 0.8  # ratio of roughnesses
 # a carried error: its factor, the growth up to which it is carried; distance from the circle beyond which it may be, as
 # a multiple of it and absolutely; rounding of a product of matrices
 TRUST = (3.0, 4.0, 1e3, 1e-5, 1e-15)
@@ -43,8 +44,13 @@ def _same(a: Array, b: Array) -> bool:
     return a is b or np.array_equal(a, b)
 
 
-def refined(problem: Collocation, u: Array, params: Array) -> tuple[Array, Array, Workspace] | None:
-    """(change of u's nodes, corrected u at degree m + 1, its arrays) of one Newton step; None if it failed."""
+def refined(
+    problem: Collocation, u: Array, params: Array, values: Array | None = None
+) -> tuple[Array, Array, Workspace] | None:
+    """(change of u's nodes, corrected u at degree m + 1, its arrays) of one Newton step; None if it failed.
+
+    values : the multipliers but the trivial one, where they are known
+    """
     known = problem._memo.get("refined")
     if known is not None and _same(known[0], u) and _same(known[1], params):
         found_before: tuple[Array, Array, Workspace] | None = known[2]
@@ -61,7 +67,7 @@ def refined(problem: Collocation, u: Array, params: Array) -> tuple[Array, Array
         t_stages = mesh.resample(higher, t_nodes, t_stages)
         tangent = Tangent(higher.join(t_nodes, t_stages, t_rest), t.parameter, t.weight)
     result: Any = None
-    if tangent is None and _is_singular(problem, u, params):
+    if tangent is None and _is_singular(problem, u, params, values):
         result = _held_step(problem, u, params)
     else:
         found = problem.newton(higher, start, params, index, tangent, 0.0, np.inf, 1)
@@ -71,8 +77,10 @@ def refined(problem: Collocation, u: Array, params: Array) -> tuple[Array, Array
     return result
 
 
-def _is_singular(problem: Collocation, u: Array, params: Array) -> bool:
+def _is_singular(problem: Collocation, u: Array, params: Array, values: Array | None) -> bool:
     """Whether a multiplier besides the trivial one is 1, nearly."""
+    if values is not None:
+        return bool(np.abs(values - 1).min(initial=1.0) < _SINGULAR)
     L = problem.linearise(u, params)
     M = L.spectral
     if L.sign == 0.0 or not np.isfinite(M).all():
@@ -122,17 +130,20 @@ def multiplier_error(
 
     Where none is near the circle, but for those that are critical by construction, the change at an earlier point of
     the same mesh is carried over, times 3 and the square of the growth of the m-th derivative (up to 4): nodes have
-    twice the order of the polynomial.
+    twice the order of the polynomial. On a curve of special points, whose own error it is, only between points that are
+    nearly as rough.
     """
     solution, roughness = linearisation.solution, linearisation.summary[2]
     problem._memo["roughness"] = solution, roughness
     carried, _ = carried_errors(problem, solution, roughness)
+    if linearisation.critical and not _alike(problem, roughness):
+        carried = math.inf
     free = values.tolist()
     for target in linearisation.critical[: len(free)]:
         free.remove(min(free, key=lambda z: abs(z - target)))
     if min((abs(abs(z) - 1) for z in free), default=1.0) > TRUST[2] * carried + TRUST[3]:
         return carried
-    step = refined(problem, solution, linearisation.solution_params)
+    step = refined(problem, solution, linearisation.solution_params, values)
     if step is None:
         return math.inf
     other = problem.spectral_of(monodromy_product(step[2].M))
@@ -142,6 +153,12 @@ def multiplier_error(
     nodes = node_error(problem, solution, linearisation.solution_params)
     problem._memo["level"] = (max(error, 1e-15), nodes, roughness)
     return error
+
+
+def _alike(problem: Collocation, roughness: float) -> bool:
+    """Whether the point at which errors were measured last is hardly rougher or smoother than this one."""
+    known = problem._memo.get("level")
+    return known is not None and _ALIKE * known[2] < roughness and _ALIKE * roughness < known[2]
 
 
 def carried_errors(problem: Collocation, u: Array, roughness: float | None = None) -> tuple[float, float]:

@@ -336,7 +336,7 @@ class CollocationLinearisation:
             solve_stages(*self.factors(), X)
         eta = problem.closure.T @ (w[:n] / D)
         rho = self.phase_row * float(w[n]) if own else np.zeros((mesh.intervals, mesh.degree * n))
-        bend = np.zeros(m) if own or amount == 0.0 else amount * problem.flow.period_second(self.params, free)
+        bend = np.zeros(m) if own or amount == 0.0 else amount * self._period_second(free)
         by_stages, by_params = np.empty((mesh.intervals, mesh.degree * n)), np.empty(m)
         rest = gradient(
             sweeps(), problem.evaluations.directional_address("second_gradient"), *self.factors(), mesh.rule.update,
@@ -345,6 +345,16 @@ class CollocationLinearisation:
             by_stages, by_params,
         )  # fmt: skip
         return mesh.join(np.zeros((mesh.intervals + 1, n)), by_stages, rest), by_params
+
+    def _period_second(self, free: int) -> Array:
+        """d2T / dp_free dp (m,) of the forcing period, made once."""
+        if free not in self._bends:
+            self._bends[free] = self.problem.flow.period_second(self.params, free)
+        return self._bends[free]
+
+    @cached_property
+    def _bends(self) -> dict[int, Array]:
+        return {}
 
     @property
     def sizes(self) -> Array:

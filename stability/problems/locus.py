@@ -181,8 +181,7 @@ class Locus:
         LinAlgError
             The linearisation is not finite.
         """
-        x, _, extra = self.parts(u)
-        L = self.inner.linearise(x, self.completed(u, params))
+        extra, L = self.parts(u)[2], self._linearised(u, params)
         A = singular_matrix(self.kind, L, self.inner.critical, self.along, extra)
         values = np.linalg.svd(A, compute_uv=False)
         self.remember("inner", u, L)
@@ -201,9 +200,16 @@ class Locus:
         """The inner problem's linearisation, remembered for the last point."""
         L = self.recalled("inner", u)
         if L is None:
-            L = self.inner.linearise(self.parts(u)[0], self.completed(u, params))
+            L = self._linearised(u, params)
             self.remember("inner", u, L)
         return L
+
+    def _linearised(self, u: Array, params: Array) -> Any:
+        """The inner problem's linearisation; one that can is told which values are critical."""
+        L = self.inner.linearise(self.parts(u)[0], self.completed(u, params))
+        if not hasattr(L, "critical"):
+            return L
+        return dataclasses.replace(L, critical=tuple(self.targets(self.parts(u)[2])))
 
     def inner_values(self, u: Array, params: Array) -> NDArray[np.complex128]:
         """The inner problem's multipliers or eigenvalues, remembered for the last point."""
@@ -213,7 +219,7 @@ class Locus:
         spectrum = self.recalled("spectrum", u)
         if spectrum is None:
             L = self.inner_linearisation(u, params)
-            if self.kind is Kind.FOLD:
+            if self.kind is Kind.FOLD and not self.condensed:  # a collocated orbit holds itself (`collocation_error`)
                 self._settled(u, params)
             spectrum = self.inner.spectrum(L)
             self.remember("spectrum", u, spectrum)
