@@ -186,13 +186,16 @@ def dip_of(points: tuple[Point, Point, Point], which: int, triples: list[Triple]
     """The dip of a test function: 0 plus, 1 minus, 2 pair (`points.smooth_tests`), 3 rate of the parameter.
 
     -1, -2: the deepest dip of any single real, any complex value followed through the three (see `matched`); a value
-    that goes out and comes back inside a step is smoother by itself than in a product with all the others.
+    that goes out and comes back inside a step is smoother by itself than in a product with all the others. A real one
+    that was complex is not: there only the products are smooth.
     """
     p, q, r = points
     at = (p.s, q.s, r.s)
     if which >= 0:
         return vertex(at, (_test(p, which), _test(q, which), _test(r, which)))
     deepest = None
+    if which == -1:
+        triples = [t for t in (matched(points) if triples is None else triples) if t[0].imag == t[2].imag == 0.0]
     for values in growth_of(points, which, triples):
         size = abs(values[1])
         dip = vertex(at, values) if size < abs(values[0]) or size < abs(values[2]) else None

@@ -33,7 +33,8 @@ _AMBIGUOUS = 10  # halvings after which the simplest explanation of a change is 
 _EDGE = 1e-6  # how far outside its bracket, in units of the bracket, a located point may lie
 _TURN = 0.05  # longest segment in which a turn is taken for a part of a branch point
 _ONE_PLACE = 2e-4  # scaled distance below which a fold and a branch point of one parameter value are one
-_UNFOLDING = 1e-10  # a perturbed crossing is no branch point: its unfolding parameter is not zero
+_UNFOLDING = 1e-10  # a perturbed crossing is no branch point: its unfolding parameter is not zero,
+_IMPERFECT = 1e-6  # unless it is smaller than the error of the discretisation (and this), which unfolds as well
 _SIGNATURE = 1e-5  # how close to the limit the critical value of a located point must be
 
 
@@ -379,7 +380,10 @@ def _signature(kind: Kind, located: Located, point: Point) -> bool:
     critical, values = point.problem.critical, point.spectrum.values
     allowed = _SIGNATURE + 100 * point.spectrum.error
     if kind is Kind.BRANCH_POINT:
-        return abs(float(located.extra[0])) < _UNFOLDING
+        unfolding = abs(float(located.extra[0]))
+        if unfolding < _UNFOLDING or unfolding > _IMPERFECT:
+            return unfolding < _UNFOLDING
+        return unfolding < point.problem.error(point.u, point.params)
     extra, paired = float(located.extra[0]), values[values.imag != 0]
     if not paired.size:
         return False

@@ -14,7 +14,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from ..words import Kind
-from .events import TURN, Triple, crossed, dip_of, double_turn, growth_of, matched, supported
+from .events import TURN, Triple, changes, crossed, dip_of, double_turn, growth_of, matched, supported
 from .locating import Found, Locator, shown
 from .points import Point
 
@@ -50,6 +50,9 @@ def between(
     for x, which, depth in cuts:
         if x <= a.s and not behind:
             continue
+        searched = here if x > a.s else behind
+        if which in (0, -1) and _touches(searched[0], searched[-1]):
+            continue
         turn = _turning_point(locator, segments, which, x)
         if turn is not None:
             knots = here if turn.problem is a.problem and turn.s > a.s else behind
@@ -68,18 +71,40 @@ def _foretold(points: tuple[Point, Point, Point], triples: list[Triple]) -> bool
     """Whether a real value that came down toward the limit should have passed it, or almost, and has not.
 
     Going on as between the first two it changes sign before the third, or it is far smaller than `stepping.room` lets
-    it become.
-    A value at a fold vanishes with the parameter's rate: only their ratio tells of a branch point.
+    it become. Multipliers: those at +1, for at -1 no branches of one problem cross.
+    At a fold the value nearest to the limit vanishes with the parameter's rate: there only their ratio tells of a
+    branch point. The ratios of others tell nothing.
     """
     r0, r1, r2 = (abs(p.tangent.parameter) for p in points)
     if not points[2].step > 0 < points[1].step or not (r0 and r1 and r2):
         return False
-    for y0, y1, y2 in growth_of(points, -1, triples):
-        before, now, then = y0 / r0, y1 / r1, y2 / r2
-        ahead = now + (now - before) * (points[2].step / points[1].step)
-        if before * now > 0 and now * then > 0 and (ahead * now < 0 or abs(then) < _SUDDEN * abs(now)):
+    if points[1].problem.critical.circle:
+        triples = [t for t in triples if t[1].real > 0.0]
+    values = growth_of(points, -1, triples)
+    least = min((abs(y1) for _, y1, _ in values), default=0.0)
+    further = points[2].step / points[1].step
+    for y0, y1, y2 in values:
+        if not (y0 * y1 > 0 and y1 * y2 > 0):
+            continue
+        at_fold = abs(y1) == least and _comes_down(y0 / r0, y1 / r1, y2 / r2, further)
+        if at_fold or _comes_down(y0, y1, y2, further):
             return True
     return False
+
+
+def _touches(p: Point, q: Point) -> bool:
+    """Whether a fold and a branch point between p and q explain that a value came to +1 (or 0) and went back.
+
+    Where a pitchfork is met on its own side branch both are one point, and no step near it may end on it.
+    """
+    change = changes(p, q)
+    return change.fold and change.branch
+
+
+def _comes_down(before: float, now: float, then: float, further: float) -> bool:
+    """Whether the line through two numbers of one sign changes it before the third, or that is far smaller."""
+    ahead = now + (now - before) * further
+    return ahead * now < 0 or abs(then) < _SUDDEN * abs(now)
 
 
 def hopped(locator: Locator, a: Point, b: Point) -> bool:

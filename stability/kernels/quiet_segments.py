@@ -160,8 +160,9 @@ def quiet(re, im, k, count, readings, signs, rates, steps, gap, moved, watch):  
         if _depth(x1, x2, y0, y1, y2) < watch[0]:
             return False
         if im[k, i] == 0.0 and before > 0.0:
-            y0, y1, y2 = y0 / abs(r0), y1 / abs(r1), y2 / abs(r2)
-            ahead = y1 + (y1 - y0) * (after / before)
-            if y0 * y1 > 0.0 and y1 * y2 > 0.0 and (ahead * y1 < 0.0 or abs(y2) < watch[1] * abs(y1)):
-                return False
+            for _ in range(2):  # the growth, and its ratio to the parameter's rate
+                ahead = y1 + (y1 - y0) * (after / before)
+                if y0 * y1 > 0.0 and y1 * y2 > 0.0 and (ahead * y1 < 0.0 or abs(y2) < watch[1] * abs(y1)):
+                    return False
+                y0, y1, y2 = y0 / abs(r0), y1 / abs(r1), y2 / abs(r2)
     return True
