@@ -35,7 +35,8 @@ __all__ = ["warn_if_open"]
 Array = NDArray[np.float64]
 _DECADES, _STEPS = 4.0, 16
 _ANGLES, _PHASES = 48, 8
-_THIRD, _QUARTER = 3, 4  # every third angle and every fourth phase are enough to come near the backbone
+_THIRD, _HALF = 3, 2  # every third angle and every second phase are enough to come near the backbone
+_NEAR, _DOUBT = 0.5, (0.3, 0.8)  # part of the linear detuning that is left on a backbone; where few samples may err
 _SETTLED, _MOST = 1e-6, 0.5  # change of log(parameter) that ends an iteration; the largest that is made at once
 _BUMP = 1e-6
 
@@ -45,12 +46,12 @@ class Balance(NamedTuple):
 
     resisting(a, values, few) : detuning and damping force, each (K,); `few` = by few samples.
     exciting(values) : exciting force (K,).
-    begun(a, value) : values (K,) near the backbone if stiffness depends on the amplitude alone; None: not known.
+    square(value) : w^2; None: not known.
     """
 
     resisting: Callable[[Array, Array, bool], tuple[Array, Array]]
     exciting: Callable[[Array], Array]
-    begun: Callable[[Array, float], Array] | None = None
+    square: Callable[[float], float] | None = None
 
 
 def warn_if_open(branch: Branch, stacklevel: int = 3) -> None:
@@ -109,7 +110,7 @@ def _samples(few: bool) -> tuple[Array, Array, Array]:
     theta = 2 * np.pi * (np.arange(_ANGLES) + 0.5) / _ANGLES
     turns = np.arange(_PHASES) / _PHASES
     if few:
-        theta, turns = theta[_THIRD // 2 :: _THIRD], turns[::_QUARTER]
+        theta, turns = theta[_THIRD // 2 :: _THIRD], turns[::_HALF]
     angle, phase = (g.ravel() for g in np.meshgrid(theta, turns, indexing="ij"))
     waves = np.array([np.cos(angle), np.sin(angle)])
     return phase, waves, waves.T * np.array([-2.0, 2.0]) / angle.size
@@ -132,8 +133,9 @@ def _of_oscillator(problem: Any, params: Array, index: int) -> Balance:
     def field(phase: Array, states: Array, p: Array) -> Array:
         """(K, N): the acceleration at N samples for each of K parameter vectors."""
         count, size = len(p), len(phase)
-        every = np.repeat(p, size, axis=0)
-        f = evaluations.F(np.tile(phase, count), states, every)
+        every, phases = np.empty((count, size, len(params))), np.empty((count, size))
+        every[:], phases[:] = p[:, None], phase
+        f = evaluations.F(phases.ravel(), states, every.reshape(-1, len(params)))
         return np.asarray(f[:, 1 - place]).reshape(count, size)
 
     def resisting(a: Array, values: Array, few: bool) -> tuple[Array, Array]:
@@ -150,12 +152,10 @@ def _of_oscillator(problem: Any, params: Array, index: int) -> Balance:
         p = _at_values(params, index, values)
         return np.abs(field(turns, np.zeros((len(p) * _ANGLES, 2)), p) @ fundamental_of)
 
-    def begun(a: Array, value: float) -> Array:
-        square = (2 * np.pi / float(evaluations.period(_at_values(params, index, np.array([value]))[0]))) ** 2
-        detuning, _ = resisting(a, np.full(len(a), value), True)
-        return value * np.sqrt((square - detuning) / square)
+    def square(value: float) -> float:
+        return float((2 * np.pi / evaluations.period(_at_values(params, index, np.array([value]))[0])) ** 2)
 
-    return Balance(resisting, exciting, begun)
+    return Balance(resisting, exciting, square)
 
 
 def _of_slow_flow(problem: Any, params: Array, index: int) -> Balance:
@@ -183,14 +183,22 @@ def _share(balance: Balance, amplitude: float, value: float) -> float:
     if not amplitude > 0 or value == 0:
         return math.inf
     with np.errstate(all="ignore"):
-        detuning, _ = balance.resisting(amplitude * np.array([1e-6, 1.0]), np.array([value, value]), False)
-        if not abs(detuning[1]) < 0.5 * abs(detuning[0]):
+        left = _left(balance, amplitude, value, True)
+        if _DOUBT[0] < left < _DOUBT[1]:
+            left = _left(balance, amplitude, value, False)
+        if not left < _NEAR:
             return math.inf
         a = amplitude * 10 ** (_DECADES * np.arange(_STEPS + 1) / _STEPS)
         shares = _at_once(balance, a, value)
         if shares is None:
             return _in_turn(balance, a, value)
         return float(shares[-1]) if (shares < 1).all() else math.inf
+
+
+def _left(balance: Balance, amplitude: float, value: float, few: bool) -> float:
+    """The detuning over that of small motions."""
+    linear, here = balance.resisting(np.array([1e-6 * amplitude, amplitude]), np.array([value, value]), few)[0].tolist()
+    return abs(here) / abs(linear) if linear else math.inf
 
 
 def _in_turn(balance: Balance, amplitudes: Array, value: float) -> float:
@@ -211,10 +219,12 @@ def _in_turn(balance: Balance, amplitudes: Array, value: float) -> float:
 def _at_once(balance: Balance, a: Array, value: float) -> Array | None:
     """D/F (K,) where `_in_turn` takes them, for all amplitudes at the same time; None where that is not sure.
 
-    Newton's method on few samples, then on all with the slopes found. It is the same curve if each value is where the
-    two before lead, as near as one step of Newton's method.
+    Begun where w^2 is the stiffness at the first value; Newton's method on few samples, then on all with the slopes
+    found. It is the same curve if each value is where the two before lead, as near as one step of Newton's method.
     """
-    x = a * math.nan if balance.begun is None else balance.begun(a, value)
+    if balance.square is None:
+        return None
+    x = value * np.sqrt(1 - balance.resisting(a, np.full(len(a), value), True)[0] / balance.square(value))
     if not np.isfinite(x).all():  # a softening spring has no backbone at large amplitudes
         return None
     slope, damping = np.ones(len(a)), a

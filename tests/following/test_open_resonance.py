@@ -110,7 +110,7 @@ def test_all_amplitudes_at_once_as_one_after_the_other():
         balance, amplitude = open_resonance._of_oscillator(problem, p, 0), random.uniform(3.0, 30.0)
         value = abs(1 + 0.75 * p[2] * amplitude**2) ** 0.5
         once = open_resonance._share(balance, amplitude, value)
-        turns = open_resonance._share(balance._replace(begun=None), amplitude, value)
+        turns = open_resonance._share(balance._replace(square=None), amplitude, value)
         assert once == turns or abs(once - turns) < 1e-6 * abs(turns)
         open_ones += once < 1
     assert 30 < open_ones < 270
