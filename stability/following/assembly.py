@@ -72,9 +72,11 @@ def _twins(fold: Point, crossing: Point) -> bool:
 def _same(p: Point, q: Point) -> bool:
     if p.u.size != q.u.size or p.problem is not q.problem:
         return False
+    gap = abs(p.parameter - q.parameter) * p.tangent.weight
+    if gap > _MERGE:
+        return False
     du = p.u - q.u
-    gap = math.sqrt(dot(p.problem.weights, du, du)) + abs(p.parameter - q.parameter) * p.tangent.weight
-    return gap <= _MERGE
+    return math.sqrt(dot(p.problem.weights, du, du)) + gap <= _MERGE
 
 
 def _labelled(settings: Settings, entries: list[Entry]) -> tuple[list[SpecialPoint], list[int]]:

@@ -67,7 +67,9 @@ def refined(
         t_stages = mesh.resample(higher, t_nodes, t_stages)
         tangent = Tangent(higher.join(t_nodes, t_stages, t_rest), t.parameter, t.weight)
     result: Any = None
-    if tangent is None and _is_singular(problem, u, params, values):
+    if tangent is None and values is None:
+        values = _free_multipliers(problem, u, params)
+    if tangent is None and values is not None and np.abs(values - 1).min(initial=1.0) < _SINGULAR:
         result = _held_step(problem, u, params)
     else:
         found = problem.newton(higher, start, params, index, tangent, 0.0, np.inf, 1)
@@ -77,20 +79,20 @@ def refined(
     return result
 
 
-def _is_singular(problem: Collocation, u: Array, params: Array, values: Array | None) -> bool:
-    """Whether a multiplier besides the trivial one is 1, nearly."""
-    if values is not None:
-        return bool(np.abs(values - 1).min(initial=1.0) < _SINGULAR)
+def _free_multipliers(problem: Collocation, u: Array, params: Array) -> Array | None:
+    """Multipliers besides the trivial one, kept for `node_error`; None where there are none."""
     L = problem.linearise(u, params)
-    M = L.spectral
+    M, direction = L.spectral, None
     if L.sign == 0.0 or not np.isfinite(M).all():
-        return False
+        return None
     if problem.mesh.own:
         direction = problem.direction_of_flow(L)
         if not direction.any():  # an orbit at its birth stands still
-            return False
+            return None
         M = deflated(M, direction)[0]
-    return bool(np.abs(eigenvalues(M) - 1).min(initial=1.0) < _SINGULAR)
+    values = eigenvalues(M)
+    problem._memo["multipliers"] = u, values, direction
+    return values
 
 
 def _held_step(problem: Collocation, u: Array, params: Array) -> tuple[Array, Array, Workspace] | None:
@@ -120,7 +122,25 @@ def node_error(problem: Collocation, u: Array, params: Array) -> float:
     worst = float(np.abs(step[0] / problem.scales).max())
     if problem.mesh.own:
         worst = max(worst, abs(float(step[1][-1] - u[-1])) / float(u[-1]))
+    known = problem._memo.pop("multipliers", None)
+    if known is not None and known[0] is u and "level" not in problem._memo:
+        _measured(problem, step, known[1], known[2], u, worst, _roughness(problem, u))
     return worst
+
+
+def _measured(
+    problem: Collocation, step: tuple[Array, Array, Workspace], values: Array, direction: Array | None, u: Array,
+    nodes: float, roughness: float,
+) -> float:  # fmt: skip
+    """The change of the multipliers `values` by a refining step from u; what is measured is kept, to be carried."""
+    other = problem.spectral_of(monodromy_product(step[2].M))
+    if direction is not None:
+        other = deflated(other, direction)[0]
+    error = spectrum_distance(values, eigenvalues(other))
+    level = max(error, 1e-15), nodes, roughness
+    problem._memo["level"] = level
+    problem._memo.setdefault("levels", {})[id(u)] = u, level
+    return error
 
 
 def multiplier_error(
@@ -146,13 +166,8 @@ def multiplier_error(
     step = refined(problem, solution, linearisation.solution_params, values)
     if step is None:
         return math.inf
-    other = problem.spectral_of(monodromy_product(step[2].M))
-    if direction is not None:
-        other = deflated(other, direction)[0]
-    error = spectrum_distance(values, eigenvalues(other))
     nodes = node_error(problem, solution, linearisation.solution_params)
-    problem._memo["level"] = (max(error, 1e-15), nodes, roughness)
-    return error
+    return _measured(problem, step, values, direction, solution, nodes, roughness)
 
 
 def _alike(problem: Collocation, roughness: float) -> bool:
@@ -163,7 +178,9 @@ def _alike(problem: Collocation, roughness: float) -> bool:
 
 def carried_errors(problem: Collocation, u: Array, roughness: float | None = None) -> tuple[float, float]:
     """Errors of multipliers and nodes carried from an earlier point of the same mesh (see above); inf: unknown."""
-    known = problem._memo.get("level")
+    at, known = problem._memo.get("levels", {}).get(id(u), (None, None))
+    if at is not u:
+        known = problem._memo.get("level")
     if known is None:
         return math.inf, math.inf
     if roughness is None:
