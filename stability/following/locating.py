@@ -1,6 +1,7 @@
 r"""From "something happened between A and B" to located points.
 
-Every suspected kind is located by Newton on its defining system (`problems.defining`), started on the cubic Hermite
+A fold or a period doubling that is alone in its segment is found by a few points of the curve (`narrowing`). Every
+other suspected kind is located by Newton on its defining system (`problems.defining`), started on the cubic Hermite
 interpolant of the segment where the secant of the test function vanishes. A located point counts if it lies on the
 segment and shows its own signature (tangent, multiplier at the limit, cos theta inside (-1, 1), omega^2 > 0: a real
 pair with product one is a neutral saddle, no Neimark-Sacker point). If the located points together explain the change

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from ..problems.orbit_spectrum import eigenvalues
 from ..protocols import Corrected, Tangent
 from ..words import Kind
-from .points import Point, dot, make_point, smooth_tests
+from .points import SMALL, Point, dot, make_point, smooth_tests
 
 __all__ = ["interpolant", "narrowed", "value_and_slope"]
 
@@ -120,7 +120,11 @@ def _test(kind: Kind, found: Corrected) -> float:
     if kind is Kind.FOLD:
         return found.tangent.parameter if found.tangent is not None else math.nan
     matrix = getattr(found.linearisation, "spectral", None)
-    return math.nan if matrix is None else smooth_tests(eigenvalues(matrix), True)[1]
+    if matrix is None:
+        return math.nan
+    if len(matrix) > SMALL:
+        return smooth_tests(eigenvalues(matrix), True)[1]
+    return float(np.linalg.det(matrix + np.eye(len(matrix))))  # the product itself
 
 
 # ---------------------------------------------------------------------- interpolation

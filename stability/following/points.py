@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 
 from ..protocols import Corrected, Problem, Spectrum, Stride, Tangent
 
-__all__ = ["Point", "dot", "make_point", "rescaled", "smooth_tests", "strode", "tangent_of"]
+__all__ = ["SMALL", "Point", "dot", "make_point", "rescaled", "smooth_tests", "strode", "tangent_of"]
 
 Array = NDArray[np.float64]
-_SMALL = 6
+SMALL = 6  # values up to which the products are plain
 
 
 class Point(NamedTuple):
@@ -55,7 +55,7 @@ def smooth_tests(values: NDArray[np.complex128], circle: bool) -> tuple[float, f
     (0.75, 0.75, -1.25)
     """
     listed = values.tolist()
-    if len(listed) <= _SMALL:
+    if len(listed) <= SMALL:
         plus = minus = pair = 1.0 + 0.0j
         if circle:
             for i, a in enumerate(listed):
