@@ -38,29 +38,27 @@ _ANGLES, _PHASES = 48, 8
 _THIRD, _HALF = 3, 2  # every third angle and every second phase are enough to come near the backbone
 _NEAR, _DOUBT = 0.5, (0.3, 0.8)  # part of the linear detuning that is left on a backbone; where few samples may err
 _SETTLED, _MOST = 1e-6, 0.5  # change of log(parameter) that ends an iteration; the largest that is made at once
-_BUMP = 1e-6
+_BUMP, _TRIES = 1e-6, 16
 
 
 class Balance(NamedTuple):
-    """The forces of the module's head for many motions at once: amplitudes (K,) at parameter values (K,).
+    """The forces of the module's head for many motions at once: amplitudes (K,) at parameter values (K,), or at one.
 
-    resisting(a, values, few) : detuning and damping force, each (K,); `few` = by few samples.
+    resisting(a, values, few) : detuning, damping force, w^2 (slow flows: nan), each (K,); `few` = by few samples.
     exciting(values) : exciting force (K,).
-    square(value) : w^2; None: not known.
     """
 
-    resisting: Callable[[Array, Array, bool], tuple[Array, Array]]
+    resisting: Callable[[Array, Array | float, bool], tuple[Array, Array, Array]]
     exciting: Callable[[Array], Array]
-    square: Callable[[float], float] | None = None
 
 
 def warn_if_open(branch: Branch, stacklevel: int = 3) -> None:
     """Warn where an end of a frequency response is on an open resonance; costs nothing for any other branch."""
-    for end in (0, -1):
-        if branch.statuses[end] is not Status.PARAMETER_BOUND:
-            continue
-        found = _balance(branch, end)
-        share = math.inf if found is None else _share(*found)
+    ends = [end for end in (0, -1) if branch.statuses[end] is Status.PARAMETER_BOUND]
+    if not ends or not _known(branch):
+        return
+    for end in ends:
+        share = _share(*_balance(branch, end))
         if share < 1:
             system = branch.meshes[int(branch.mesh_of[end])].system.name
             warnings.warn(
@@ -73,25 +71,36 @@ def warn_if_open(branch: Branch, stacklevel: int = 3) -> None:
             )
 
 
-def _balance(branch: Branch, end: int) -> tuple[Balance, float, float] | None:
-    """(balance, amplitude, parameter) at an end of a response that this module knows; None for all others."""
-    problem = branch.meshes[int(branch.mesh_of[end])]
-    system, kind = getattr(problem, "system", None), branch.method.get("problem")
-    if system is None or len(system.coordinates) == 0 or system.stops:
-        return None
-    index = list(system.parameters).index(branch.name) if branch.name in system.parameters else None
-    if index is None:
-        return None
-    value, params = float(branch.parameter[end]), branch._vector(end if end == 0 else len(branch) - 1)
+def _is_slow(branch: Branch) -> bool:
+    system = branch.meshes[0].system
     slow = bool(system.reconstruction) and system.states[0].endswith("_cos")
-    if kind == "Equilibrium" and slow and len(system.states) == 2:
-        return _of_slow_flow(problem, params, index), float(np.hypot(*branch.unknowns[end])), value
-    forced = kind in ("Collocation", "HarmonicBalance", "Shooting") and getattr(problem, "multiple", 0) == 1
-    if not forced or problem.own or len(system.states) != 2 or len(system.coordinates) != 1:
-        return None
-    if branch.name not in {s.name for s in getattr(system.period_expression, "free_symbols", ())}:
-        return None
-    return _of_oscillator(problem, params, index), _amplitude(problem, branch.unknowns[end], params), value
+    return branch.method.get("problem") == "Equilibrium" and slow and len(system.states) == 2
+
+
+def _known(branch: Branch) -> bool:
+    """Whether the branch is a frequency response that this module knows."""
+    problem = branch.meshes[0]
+    system = getattr(problem, "system", None)
+    if system is None or len(system.coordinates) == 0 or system.stops or branch.name not in system.parameters:
+        return False
+    if _is_slow(branch):
+        return True
+    kind = branch.method.get("problem") in ("Collocation", "HarmonicBalance", "Shooting")
+    if not kind or getattr(problem, "multiple", 0) != 1 or problem.own:
+        return False
+    if len(system.states) != 2 or len(system.coordinates) != 1:
+        return False
+    return branch.name in {s.name for s in getattr(system.period_expression, "free_symbols", ())}
+
+
+def _balance(branch: Branch, end: int) -> tuple[Balance, float, float]:
+    """(balance, amplitude, parameter) at an end."""
+    problem, u = branch.meshes[int(branch.mesh_of[end])], branch.unknowns[end]
+    value, params = float(branch.parameter[end]), branch._vector(end if end == 0 else len(branch) - 1)
+    index = list(problem.system.parameters).index(branch.name)
+    if _is_slow(branch):
+        return _of_slow_flow(problem, params, index), float(np.hypot(*u)), value
+    return _of_oscillator(problem, params, index), _amplitude(problem, u, params), value
 
 
 def _amplitude(problem: Any, u: Array, params: Array) -> float:
@@ -101,78 +110,86 @@ def _amplitude(problem: Any, u: Array, params: Array) -> float:
     return float(problem.measures(u, params)[f"{problem.system.coordinates[0]}.amplitude(1)"])
 
 
-@lru_cache(maxsize=2)
-def _samples(few: bool) -> tuple[Array, Array, Array]:
-    """Angles of the motion and phases of the forcing, cos and sin of all pairs: (phase, (2, N) cos sin, (N, 2) means).
+@lru_cache(maxsize=16)
+def _motions(count: int, few: bool, place: int) -> tuple[Array, Array, Array]:
+    """Samples of `count` motions q = cos(angle): phases (K N,), (K, N, 2) states, (N, 2) weights of the means.
 
-    The angles are mirrored at 0 and pi, where dry friction jumps. The means are -2 <f cos>, 2 <f sin>.
+    N pairs of an angle and a phase of the forcing; the angles are mirrored at 0 and pi, where dry friction jumps.
+    States are (q, -q') with the place of q; the means are -2 <f cos>, 2 <f sin>.
     """
     theta = 2 * np.pi * (np.arange(_ANGLES) + 0.5) / _ANGLES
     turns = np.arange(_PHASES) / _PHASES
     if few:
         theta, turns = theta[_THIRD // 2 :: _THIRD], turns[::_HALF]
     angle, phase = (g.ravel() for g in np.meshgrid(theta, turns, indexing="ij"))
-    waves = np.array([np.cos(angle), np.sin(angle)])
-    return phase, waves, waves.T * np.array([-2.0, 2.0]) / angle.size
+    waves = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    states = waves if place == 0 else waves[:, ::-1]
+    return np.tile(phase, count), np.tile(states, (count, 1, 1)), waves * np.array([-2.0, 2.0]) / angle.size
 
 
-def _at_values(params: Array, index: int, values: Array) -> Array:
-    """(K, m): the parameters with another one of them."""
-    p = np.repeat(params[None], len(values), axis=0)
-    p[:, index] = values
-    return p
+def _at_values(params: Array, index: int, values: Array | float, each: int) -> Array:
+    """(m,), or (K each, m) for values (K,): the parameters with another one of them."""
+    if isinstance(values, float):
+        p = params.copy()
+        p[index] = values
+        return p
+    p = np.empty((len(values), each, len(params)))
+    p[:] = params
+    p[:, :, index] = values[:, None]
+    return p.reshape(-1, len(params))
 
 
 def _of_oscillator(problem: Any, params: Array, index: int) -> Balance:
     """The head of this module, by samples of f over the angle of the motion and the phase of the forcing."""
     system, evaluations = problem.system, problem.evaluations
     place = system.states.index(system.coordinates[0])
-    turns = np.arange(_ANGLES) / _ANGLES
-    fundamental_of = 2 * np.exp(-2j * np.pi * turns) / _ANGLES
 
-    def field(phase: Array, states: Array, p: Array) -> Array:
-        """(K, N): the acceleration at N samples for each of K parameter vectors."""
-        count, size = len(p), len(phase)
-        every, phases = np.empty((count, size, len(params))), np.empty((count, size))
-        every[:], phases[:] = p[:, None], phase
-        f = evaluations.F(phases.ravel(), states, every.reshape(-1, len(params)))
-        return np.asarray(f[:, 1 - place]).reshape(count, size)
-
-    def resisting(a: Array, values: Array, few: bool) -> tuple[Array, Array]:
-        p = _at_values(params, index, values)
-        w = 2 * np.pi / evaluations.period(p)
-        phase, (cosine, sine), means = _samples(few)
-        states = np.empty((len(a), len(phase), 2))
-        np.multiply(a[:, None], cosine, out=states[:, :, place])
-        np.multiply((-a * w)[:, None], sine, out=states[:, :, 1 - place])
-        k, damping = (field(phase, states.reshape(-1, 2), p) @ means).T
-        return w * w - k / a, damping
+    def resisting(a: Array, values: Array | float, few: bool) -> tuple[Array, Array, Array]:
+        count = len(a)
+        phases, unit, means = _motions(count, few, place)
+        each = unit.shape[1]
+        p = _at_values(params, index, values, each)
+        w = np.asarray(2 * np.pi / evaluations.period(p if p.ndim == 1 else p[::each]))
+        sizes = np.empty((count, 1, 2))
+        sizes[:, 0, place], sizes[:, 0, 1 - place] = a, -a * w
+        f = evaluations.F(phases, (unit * sizes).reshape(-1, 2), p)
+        k, damping = (f[:, 1 - place].reshape(count, each) @ means).T
+        square = w * w
+        return square - k / a, damping, square
 
     def exciting(values: Array) -> Array:
-        p = _at_values(params, index, values)
-        return np.abs(field(turns, np.zeros((len(p) * _ANGLES, 2)), p) @ fundamental_of)
+        turns, waves = _harmonic()
+        count = len(values)
+        p = _at_values(params, index, values, _ANGLES)
+        f = evaluations.F(np.tile(turns, count), np.zeros((count * _ANGLES, 2)), p)
+        return np.abs(f[:, 1 - place].reshape(count, _ANGLES) @ waves)
 
-    def square(value: float) -> float:
-        return float((2 * np.pi / evaluations.period(_at_values(params, index, np.array([value]))[0])) ** 2)
+    return Balance(resisting, exciting)
 
-    return Balance(resisting, exciting, square)
+
+@lru_cache(maxsize=1)
+def _harmonic() -> tuple[Array, NDArray[np.complex128]]:
+    """Phases, and the weights that make twice the fundamental harmonic of samples there."""
+    turns = np.arange(_ANGLES) / _ANGLES
+    return turns, 2 * np.exp(-2j * np.pi * turns) / _ANGLES
 
 
 def _of_slow_flow(problem: Any, params: Array, index: int) -> Balance:
     """The same of a slow flow z': z' at rest is the excitation, what z = (a, 0) adds is damping and detuning."""
 
-    def resisting(a: Array, values: Array, few: bool) -> tuple[Array, Array]:
-        count = len(a)
-        states = np.zeros((2 * count, 2))
-        states[count:, 0] = a
-        both = _at_values(params, index, np.concatenate([values, values]))
-        z = problem.evaluations.F(np.zeros(2 * count), states, both)
-        rest, moved = z[:count], z[count:]
-        return (moved[:, 1] - rest[:, 1]) / a, rest[:, 0] - moved[:, 0]
+    def flow(a: Array, values: Array | float) -> Array:
+        states = np.zeros((len(a), 2))
+        states[:, 0] = a
+        return np.asarray(problem.evaluations.F(np.zeros(len(a)), states, _at_values(params, index, values, 1)))
+
+    def resisting(a: Array, values: Array | float, few: bool) -> tuple[Array, Array, Array]:
+        both = values if isinstance(values, float) else np.concatenate([values, values])
+        z = flow(np.concatenate([0 * a, a]), both)
+        rest, moved = z[: len(a)], z[len(a) :]
+        return (moved[:, 1] - rest[:, 1]) / a, rest[:, 0] - moved[:, 0], a * math.nan
 
     def exciting(values: Array) -> Array:
-        count = len(values)
-        rest = problem.evaluations.F(np.zeros(count), np.zeros((count, 2)), _at_values(params, index, values))
+        rest = flow(0 * values, values)
         return np.hypot(rest[:, 0], rest[:, 1])
 
     return Balance(resisting, exciting)
@@ -197,7 +214,7 @@ def _share(balance: Balance, amplitude: float, value: float) -> float:
 
 def _left(balance: Balance, amplitude: float, value: float, few: bool) -> float:
     """The detuning over that of small motions."""
-    linear, here = balance.resisting(np.array([1e-6 * amplitude, amplitude]), np.array([value, value]), few)[0].tolist()
+    linear, here = balance.resisting(np.array([1e-6 * amplitude, amplitude]), value, few)[0].tolist()
     return abs(here) / abs(linear) if linear else math.inf
 
 
@@ -219,42 +236,52 @@ def _in_turn(balance: Balance, amplitudes: Array, value: float) -> float:
 def _at_once(balance: Balance, a: Array, value: float) -> Array | None:
     """D/F (K,) where `_in_turn` takes them, for all amplitudes at the same time; None where that is not sure.
 
-    Begun where w^2 is the stiffness at the first value; Newton's method on few samples, then on all with the slopes
-    found. It is the same curve if each value is where the two before lead, as near as one step of Newton's method.
+    The secant method with few samples, begun where w^2 is the stiffness at the first value, with the slope 2 w^2 (w goes
+    with the parameter); then with all samples, unless some amplitudes show that few are enough. It is the same curve if
+    each value is where the two before lead, as near as one step of `_on_backbone`.
     """
-    if balance.square is None:
+    detuning, _, square = balance.resisting(a, value, True)
+    slope: Array
+    x, slope = value * np.sqrt(1 - detuning / square), 2 * square
+    if not np.isfinite(x).all():  # a softening spring has no backbone at large amplitudes; a slow flow tells no w^2
         return None
-    x = value * np.sqrt(1 - balance.resisting(a, np.full(len(a), value), True)[0] / balance.square(value))
-    if not np.isfinite(x).all():  # a softening spring has no backbone at large amplitudes
-        return None
-    slope, damping = np.ones(len(a)), a
-    for few in (True, False):
-        for _ in range(8):
-            if few:
-                gap, bumped = np.split(
-                    balance.resisting(np.tile(a, 2), np.concatenate([x, x * (1 + _BUMP)]), True)[0], 2
-                )
-                slope = (bumped - gap) / _BUMP
-            else:
-                gap, damping = balance.resisting(a, x, False)
-            change = -gap / slope
-            size = float(np.abs(change).max())
-            if not size < math.inf:
-                return None
-            x = x * np.exp(np.clip(change, -_MOST, _MOST))
-            if size < _SETTLED:
-                break
-        else:
+    few, last, change, damping = True, detuning, x, square
+    for count in range(_TRIES):
+        gap, damping, square = balance.resisting(a, x, few)
+        if count == 0:
+            slope = 2 * square
+        elif few:
+            slope = np.where(np.abs(gap - last) > 1e-3 * np.abs(last), (gap - last) / change, slope)
+        last, change = gap, np.clip(-gap / slope, -_MOST, _MOST)
+        size = float(np.abs(change).max())
+        if not size < math.inf:
             return None
+        if size < _SETTLED:
+            if not few or _enough(balance, a, x, gap, damping, square):
+                break
+            few = False
+            continue
+        x = x * np.exp(change)
+    else:
+        return None
     steps = np.diff(np.log(x / value))
     return damping / balance.exciting(x) if (np.abs(np.diff(steps)) < _MOST).all() else None
+
+
+def _enough(balance: Balance, a: Array, x: Array, gap: Array, damping: Array, square: Array) -> bool:
+    """Whether all samples give at the first, the middle and the last amplitude what few give."""
+    some = np.array([0, len(a) // 2, len(a) - 1])
+    other, force, _ = balance.resisting(a[some], x[some], False)
+    near = np.abs(other - gap[some]) < 1e-9 * square[some]
+    return bool((near & (np.abs(force - damping[some]) < 1e-9 * np.abs(force))).all())
 
 
 def _on_backbone(balance: Balance, a: float, guess: float) -> tuple[float, float] | None:
     """(parameter at which the detuning is zero, damping force), by Newton's method on its logarithm; None: nowhere."""
     x = guess
     for _ in range(40):
-        (gap, bumped), (damping, _) = balance.resisting(np.array([a, a]), np.array([x, x * (1 + _BUMP)]), False)
+        both = np.array([x, x * (1 + _BUMP)])
+        (gap, bumped), (damping, _), _ = balance.resisting(np.array([a, a]), both, False)
         slope = (bumped - gap) / _BUMP
         if not (math.isfinite(gap) and math.isfinite(slope)) or slope == 0:
             return None
