@@ -236,9 +236,9 @@ def _in_turn(balance: Balance, amplitudes: Array, value: float) -> float:
 def _at_once(balance: Balance, a: Array, value: float) -> Array | None:
     """D/F (K,) where `_in_turn` takes them, for all amplitudes at the same time; None where that is not sure.
 
-    The secant method with few samples, begun where w^2 is the stiffness at the first value, with the slope 2 w^2 (w goes
-    with the parameter); then with all samples, unless some amplitudes show that few are enough. It is the same curve if
-    each value is where the two before lead, as near as one step of `_on_backbone`.
+    The secant method with few samples, begun where w^2 is the stiffness at the first value, with the slope 2 w^2 (w is
+    taken to go with the parameter); then with all samples, unless some amplitudes show that few are enough. It is the
+    same curve if each value is where the two before lead, as near as one step of `_on_backbone`.
     """
     detuning, _, square = balance.resisting(a, value, True)
     slope: Array
