@@ -20,6 +20,9 @@ from typing import Any
 
 import numba
 from numba.core.caching import FunctionCache
+from numba.core.compiler import Compiler
+
+from stability.kernels.parts import PartCompiler
 
 __all__ = ["kernel"]
 
@@ -103,6 +106,7 @@ def kernel(
         no_cpython_wrapper=inline,
         forceinline=merged,
         fastmath={"reassoc"} if sums else False,
+        pipeline_class=PartCompiler if inline else Compiler,
     )(function)
     if not inline:
         with contextlib.suppress(*_EVERYTHING_A_DAMAGED_FILE_RAISES):
