@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError, InputError
 from ..protocols import Corrected, Problem, Seed, Tangent
 from .follower import Entry, Follower
-from .points import Point, dot, make_point, smooth_tests, tangent_of
+from .points import Point, dot, make_point, rescaled, smooth_tests, tangent_of
 from .settings import Settings
 
 __all__ = ["born_sides", "first_point", "inside_window"]
@@ -48,14 +48,17 @@ def first_point(problem: Problem, settings: Settings, start: Any, value: float) 
         )
     inward = math.copysign(1.0, settings.window[1] - settings.window[0])
     found, tangent = _with_tangent(problem, found, settings, inward)
+    point = make_point(problem, found, tangent, settings.index, 0.0, 0.0)  # what its errors are tells how to adapt
     better = problem.adapt(found.u, found.params, tangent)
-    if better is not None:
-        u, old = better[1], found
-        problem = better[0]
-        found = problem.correct(u, old.params, settings.name, None, 0.0, settings.tolerance)
-        if not found.converged:
-            raise ConvergenceError(f"the first solution was lost when its mesh was adapted: {found.note}", last=old.u)
-        found, tangent = _with_tangent(problem, found, settings, inward)
+    if better is None:
+        return point
+    problem, u, _ = better
+    if u is found.u:
+        return rescaled(point, problem)
+    found = problem.correct(u, found.params, settings.name, None, 0.0, settings.tolerance)
+    if not found.converged:
+        raise ConvergenceError(f"the first solution was lost when its mesh was adapted: {found.note}", last=point.u)
+    found, tangent = _with_tangent(problem, found, settings, inward)
     return make_point(problem, found, tangent, settings.index, 0.0, 0.0)
 
 

@@ -139,5 +139,4 @@ class OrbitMesh:
 
     def quadrature(self, scales: Array) -> Array:
         """(N, m n) weights h_j b_i / scale^2 of the inner product, at the stages."""
-        weights = (self.h[:, None] * self.rule.weights)[:, :, None] / scales**2
-        return np.ascontiguousarray(weights.reshape(self.intervals, -1))
+        return np.asarray(self.weights[:, None] / scales**2).reshape(self.intervals, -1)
