@@ -2,10 +2,14 @@ r"""Recognising a closed branch: has the curve come back to where it was, in the
 
 The first points of a branch are remembered, a few of them, so that one is away from folds. When the parameter passes
 the value of one of them again in the same direction, the solution there is computed and compared by its extrema and
-period: they do not depend on the mesh, nor on the phase of an autonomous orbit.
+period: they do not depend on the mesh, nor on the phase of an autonomous orbit. A segment in which the parameter turns
+is looked at in its two parts: a remembered point may lie in one of them.
 """
 
 from __future__ import annotations
+
+import math
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +17,7 @@ from numpy.typing import NDArray
 from ..results.solutions import FixedPoint, PeriodicOrbit
 from ..words import Kind
 from .locating import Locator
-from .points import Point
+from .points import Point, dot
 
 __all__ = ["Home", "collapsed"]
 
@@ -38,6 +42,13 @@ class Home:
 
     def reached(self, a: Point, b: Point, locator: Locator, accepted: int) -> tuple[Point, float] | None:
         """(the point again, arclength of the whole loop) if the segment from a to b passes a remembered point."""
+        for p, q in _monotone(a, b, locator, [mark for number, mark in self.marks if accepted >= number + _FEWEST]):
+            found = self._passed(p, q, locator, accepted)
+            if found is not None:
+                return found
+        return None
+
+    def _passed(self, a: Point, b: Point, locator: Locator, accepted: int) -> tuple[Point, float] | None:
         for number, mark in self.marks:
             passed = (a.parameter - mark.parameter) * (b.parameter - mark.parameter) < 0
             same_way = b.tangent.parameter * mark.tangent.parameter > 0
@@ -45,8 +56,35 @@ class Home:
                 continue
             point = locator.at_parameter(a, b, mark.parameter)
             if point is not None and _same(point, mark):
-                return point, point.s - mark.s
+                return point, point.s - self.marks[0][1].s - self._since_first(mark, point)
         return None
+
+    def _since_first(self, mark: Point, at: Point) -> float:
+        """Length of the curve from the first point to the mark, in the norm of `at` where scales have changed."""
+        known = [p for _, p in self.marks]
+        passed = known[: 1 + next(i for i, p in enumerate(known) if p is mark)]
+        w, weight = at.problem.weights, at.tangent.weight
+        if at.problem is mark.problem or any(p.u.size != at.u.size for p in passed):
+            return mark.s - known[0].s
+        steps = [(q.u - p.u, (q.parameter - p.parameter) * weight) for p, q in pairwise(passed)]
+        return sum(math.sqrt(dot(w, du, du) + dl * dl) for du, dl in steps)
+
+
+def _monotone(a: Point, b: Point, locator: Locator, marks: list[Point]) -> list[tuple[Point, Point]]:
+    """The segment; in two parts where the parameter turns in it beyond a remembered point that lies beside its ends."""
+    r, t, h = a.tangent.parameter, b.tangent.parameter, b.s - a.s
+    if not (marks and r * t < 0 and h > 0):
+        return [(a, b)]
+    bend = 3 * (r + t) - 6 * (b.parameter - a.parameter) / h  # the rate is about r + (t - r - bend) x + bend x^2
+    slope = t - r - bend
+    x = 2 * r / (-slope + math.copysign(math.sqrt(max(slope**2 - 4 * bend * r, 0.0)), r))
+    turn = a.parameter + h * x * (r + x * (slope / 2 + x * bend / 3))
+    ends = (a.parameter, b.parameter)
+    beyond = (max(ends), turn) if turn > max(ends) else (turn, min(ends))
+    if not (0 < x < 1 and any(beyond[0] < mark.parameter < beyond[1] for mark in marks)):
+        return [(a, b)]
+    middle = locator.on_curve(a, b, x)
+    return [(a, b)] if middle is None else [(a, middle), (middle, b)]
 
 
 def _same(p: Point, q: Point) -> bool:
@@ -62,8 +100,17 @@ def _same(p: Point, q: Point) -> bool:
 def _invariants(point: Point) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """(k, 2) numbers of a solution that depend neither on its mesh nor on its phase, and which of them are angles.
 
-    Extrema of every state, and the period.
+    Extrema of every state, and the period; of a curve of special points the second parameter as well.
     """
+    values, angles = _of_solution(point)
+    second = getattr(point.problem, "free", None)
+    if second is None:
+        return values, angles
+    at = point.problem.measures(point.u, point.params)[second]
+    return np.vstack([values, [at, at]]), np.append(angles, False)
+
+
+def _of_solution(point: Point) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     system = getattr(point.problem, "system", None)
     angles = getattr(system, "angles", ())
     measures = point.problem.measures(point.u, point.params)

@@ -4,6 +4,10 @@ A problem may have ``monitors``, a tuple of (kind, function of a point), and ``c
 names a located zero or says that it is none (a pole, a neutral saddle). Zeros are found by Illinois iteration along the
 curve between neighbouring points, as for a user's events, instead of the driver's own events: such a curve has neither
 counts nor defining systems of its own. Where a function has an ``exact`` companion, that one is used to locate.
+
+Two zeros within a step leave the signs at its ends as they were. A function g that is the derivative along the curve of
+its companion ``primitive``, G, is there the parabola with the values g(0), g(1) and the mean G(1) - G(0); any other one
+the parabola through the point before as well. Where that has changed sign in between, the curve is looked at there.
 Where the curve itself branches, `crossings` finds. Problems without monitors cost nothing here.
 """
 
@@ -25,6 +29,7 @@ class Monitor:
 
     def __init__(self, first: Point) -> None:
         self.values = [function(first) for _, function in getattr(first.problem, "monitors", ())]
+        self._older: list[tuple[float, float] | None] = [None] * len(self.values)  # (arclength, value) before that
         self._answer: tuple[object, Any] = (None, None)
 
     @property
@@ -38,9 +43,9 @@ class Monitor:
         problem = knots[0].problem
         for k, (kind, function) in enumerate(getattr(problem, "monitors", ())):
             values = [self.values[k], *(function(p) for p in knots[1:])]
-            self.values[k] = values[-1]
             exact = getattr(function, "exact", function)
-            for (p, gp), (q, gq) in pairwise(zip(knots, values)):
+            passed = list(zip(knots, values))
+            for (p, gp), (q, gq) in self._divided(locator, function, passed, k):
                 if gq != 0 and not gp * gq < 0:
                     continue
                 # a knot may lie on the zero itself: the middle of a segment that is symmetric about it
@@ -48,7 +53,23 @@ class Monitor:
                 named = _named(kind, point, p, q, max(abs(gp), abs(gq)))
                 # two functions may vanish at one point: both rates do at a cusp
                 found += [f for f in named if all(f.kind is not g.kind or f.bracket != g.bracket for g in found)]
+            self.values[k], self._older[k] = values[-1], (knots[-2].s, values[-2])
         return found + self._crossings(locator, knots)
+
+    def _divided(
+        self, locator: Locator, function: Any, passed: list[tuple[Point, float]], k: int
+    ) -> list[tuple[tuple[Point, float], tuple[Point, float]]]:
+        """Neighbouring (knot, value), with a point between two of one sign where the function has another one there."""
+        pairs = []
+        before = self._older[k]
+        for one, other in pairwise(passed):
+            x = _dip(one, other, getattr(function, "primitive", None), before)
+            middle = None if x is None else locator.on_curve(one[0], other[0], x)
+            value = 0.0 if middle is None else function(middle)
+            inside = [] if middle is None or not value * one[1] < 0 else [(middle, value)]
+            pairs += list(pairwise([one, *inside, other]))
+            before = (one[0].s, one[1])
+        return pairs
 
     def _crossings(self, locator: Locator, knots: list[Point]) -> list[Found]:
         response, found = getattr(knots[0].problem, "response", None), []
@@ -63,6 +84,25 @@ class Monitor:
             answer = after
         self._answer = (knots[-1].u, answer)
         return found
+
+
+def _dip(
+    one: tuple[Point, float], other: tuple[Point, float], primitive: Any, before: tuple[float, float] | None
+) -> float | None:
+    """Fraction of the segment at which a function of one sign at its ends is expected to have the other one."""
+    (p, gp), (q, gq) = one, other
+    h = q.s - p.s
+    if not (gp * gq > 0 and h > 0):
+        return None
+    if primitive is not None:
+        bend = 3 * (gp + gq) - 6 * (primitive(q) - primitive(p)) / h
+    elif before is not None and before[0] < p.s:
+        bend = ((gq - gp) / h - (gp - before[1]) / (p.s - before[0])) / (q.s - before[0]) * h * h
+    else:
+        return None
+    slope = gq - gp - bend
+    x = -0.5 * slope / bend if bend else -1.0
+    return x if 0 < x < 1 and (gp + 0.5 * slope * x) * gp < 0 else None
 
 
 def _located(locator: Locator, p: Point, q: Point, function: Any, ends: tuple[float, float]) -> Point | None:

@@ -54,10 +54,13 @@ _ASIDE = 1e-3  # arclength to the neighbours that tell the sign of a second deri
 
 
 class Rate:
-    """The rate of a parameter along the curve; `exact` takes the tangent of the point's own derivatives."""
+    """The rate of a parameter along the curve; `exact` takes the tangent of the point's own derivatives.
 
-    def __init__(self, of: Callable[[Any], float]) -> None:
-        self.of = of
+    `primitive` is the parameter itself, in the same scale.
+    """
+
+    def __init__(self, of: Callable[[Any], float], primitive: Callable[[Any], float]) -> None:
+        self.of, self.primitive = of, primitive
 
     def __call__(self, point: Any) -> float:
         value = self.of(point)
@@ -80,7 +83,9 @@ def _third(point: Any) -> float:
     return float(point.problem.parts(point.tangent.u)[2][0])
 
 
-_TURNS, _EXTREMA, _TOUCHES = Rate(_first), Rate(_second), Rate(_third)
+_TURNS = Rate(_first, lambda point: float(point.parameter * point.tangent.weight))
+_EXTREMA = Rate(_second, lambda point: float(point.problem.parts(point.u)[1]) / float(point.problem.scale))
+_TOUCHES = Rate(_third, lambda point: float(point.problem.parts(point.u)[2][0]))
 
 
 def monitors(curve: Locus) -> tuple[tuple[Kind, Callable[[Any], float]], ...]:
@@ -183,14 +188,13 @@ def _resonance(curve: Locus, kind: Kind, point: Any, scale: float) -> Kind | Non
 
 
 def _bend(curve: Locus, point: Any) -> float | None:
-    """Second difference of lambda_2 along the curve."""
-    ends = []
-    for step in (-_ASIDE, _ASIDE):
-        found = curve.correct(point.u, point.params, curve.along, point.tangent, step, 1e-11)
-        if not found.converged:
-            return None
-        ends.append(curve.parts(found.u)[1])
-    return ends[0] - 2 * curve.parts(point.u)[1] + ends[1]
+    """Second difference of lambda_2 along the curve over _ASIDE; from nearer neighbours where it turns sharply."""
+    for step in (_ASIDE, 0.1 * _ASIDE, 0.01 * _ASIDE):
+        found = [curve.correct(point.u, point.params, curve.along, point.tangent, s, 1e-11) for s in (-step, step)]
+        if all(f.converged for f in found):
+            before, after = (curve.parts(f.u)[1] for f in found)
+            return (before - 2 * curve.parts(point.u)[1] + after) * (_ASIDE / step) ** 2
+    return None
 
 
 def _hessian_sign(curve: Locus, point: Any, bend: float) -> int:

@@ -5,7 +5,7 @@ import pytest
 import sympy as sp
 
 import stability as st
-from stability.words import Kind
+from stability.words import Kind, Status
 
 a, b, x, y = sp.symbols("a b x y", real=True)
 
@@ -57,6 +57,30 @@ def test_an_isola_is_born_and_merges():
     assert [kind for _, kind, _ in found] == [Kind.ISOLA_CENTRE, Kind.ISOLA_MERGER, Kind.ISOLA_CENTRE]
     assert [at for at, _, _ in found] == pytest.approx(extreme, abs=1e-7)
     assert [at for _, _, at in found] == pytest.approx([float(V.subs(a, r)) for r in extreme], abs=1e-12)
+
+
+@pytest.mark.parametrize("half", [0.05, 0.02, 0.01])
+def test_two_extrema_within_one_step(half):
+    """V' = (a - 0.4)^2 - half^2: a merger and a birth at 0.4 -+ half, between points of the curve further apart."""
+    V = a**3 / 3 - sp.Rational(2, 5) * a**2 + (sp.Rational(4, 25) - half**2) * a
+    problem = st.Equilibrium(scalar(b - V - x**2, a=-0.9, b=1.0))
+    branch = st.continuation(problem, "b", (1.5, -2.0), start=st.solve(problem, start=dict(x=1.2)))
+    curve = st.continuation(st.locus(branch["LP1"], free="b", along="a"), "a", (-1.0, 1.5))
+    found = [(p.kind, p.params["a"]) for p in curve.special if p.kind is not Kind.USER]
+    assert [kind for kind, _ in found] == [Kind.ISOLA_MERGER, Kind.ISOLA_CENTRE]
+    assert [at for _, at in found] == pytest.approx([0.4 - half, 0.4 + half], abs=1e-7)
+
+
+@pytest.mark.parametrize("start", [0.003, 0.01, 0.02, 0.03, 0.05])
+def test_a_closed_curve_that_is_met_close_to_its_turning_point(start):
+    """Folds of x^2 = 1 - a^2 - b^2 from b = start: the last step passes a = 1 and the start, the parameter on one side."""
+    problem = st.Equilibrium(scalar(1 - a**2 - b**2 - x**2, a=0.0, b=start))
+    branch = st.continuation(problem, "a", (0.0, 1.5), start=st.solve(problem, start=dict(x=1.0)))
+    curve = st.continuation(st.locus(branch["LP1"], free="b"), "a", (-2.0, 2.0))
+    assert curve.status is Status.CLOSED_LOOP
+    angle = np.unwrap(np.arctan2(curve.columns["b"], curve.columns["a"]))
+    assert abs(angle[-1] - angle[0]) == pytest.approx(2 * np.pi, abs=2e-2)  # once, not several times
+    assert np.abs(np.hypot(curve.columns["a"], curve.columns["b"]) - 1).max() < 1e-9
 
 
 def test_isola_of_orbits():
