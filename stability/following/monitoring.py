@@ -13,6 +13,7 @@ Where the curve itself branches, `crossings` finds. Problems without monitors co
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Any
 
@@ -22,6 +23,8 @@ from .locating import Found, Locator
 from .points import Point
 
 __all__ = ["Monitor"]
+
+_POLE = 1e3  # a function that becomes so much larger than at both ends has no zero there
 
 
 class Monitor:
@@ -106,9 +109,17 @@ def _dip(
 
 
 def _located(locator: Locator, p: Point, q: Point, function: Any, ends: tuple[float, float]) -> Point | None:
-    """The zero between p and q; by interpolation where the curve is singular there."""
-    point = locator.zero(p, q, function, *ends)
-    if point is None and hasattr(p.problem, "residual_at"):
+    """The zero between p and q; by interpolation where the curve is singular there. None at a pole."""
+    largest, pole = _POLE * max(map(abs, ends)), False
+
+    def guarded(z: Point) -> float:
+        nonlocal pole
+        value = float(function(z))
+        pole = pole or abs(value) > largest
+        return math.nan if pole else value
+
+    point = locator.zero(p, q, guarded, *ends)
+    if point is None and not pole and hasattr(p.problem, "residual_at"):
         made = interpolated_zero(locator, p, q, function, ends)
         point = None if made is None else made[0]
     return point
