@@ -144,6 +144,17 @@ def _note(follower: Follower | None) -> str:
     return "; ".join(part for part in (end, follower.wanted.note) if part)
 
 
+def _rows(spectra: list[NDArray[np.complex128]]) -> NDArray[np.complex128]:
+    """(K, n): one below the other; shorter ones end in nan."""
+    width = max(map(len, spectra), default=0)
+    if all(len(one) == width for one in spectra):
+        return np.concatenate(spectra).astype(complex, copy=False).reshape(len(spectra), width)
+    out = np.full((len(spectra), width), np.nan, dtype=complex)
+    for row, one in zip(out, spectra):
+        row[: len(one)] = one
+    return out
+
+
 def assemble(
     settings: Settings,
     entries: list[Entry],
@@ -164,13 +175,11 @@ def assemble(
             order[key] = len(order)
             meshes[order[key]] = p.problem
         mesh_of.append(order[key])
-    width = max((p.spectrum.values.size for p in points), default=0)
-    values = np.full((len(points), width), np.nan, dtype=complex)
-    halves = values.copy() if any(getattr(p.problem, "halved", False) for p in points) else None
-    for i, p in enumerate(points):
-        values[i, : p.spectrum.values.size] = _whole(p.problem, p.spectrum.values)
-        if halves is not None:
-            halves[i, : p.spectrum.values.size] = p.spectrum.values
+    halved = [getattr(meshes[i], "halved", False) for i in range(len(meshes))]
+    values = _rows([p.spectrum.values for p in points])
+    halves = values if any(halved) else None
+    if halves is not None:
+        values = np.where(np.array(halved)[mesh_of][:, None], halves**2, halves)
     first = points[0]
     s0 = first.s
     method = {

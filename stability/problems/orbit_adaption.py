@@ -49,10 +49,12 @@ class Natural(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _places(states: tuple[str, ...], names: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _places(states: tuple[str, ...], names: tuple[str, ...]) -> tuple[Array, Array]:
     """Where the named coordinates are among the states, and their velocities; without those that are no states."""
     velocities = tuple(f"{name}_dot" for name in names)
-    first, second = (tuple(states.index(k) for k in group if k in states) for group in (names, velocities))
+    first, second = (
+        np.array([states.index(k) for k in group if k in states], dtype=int) for group in (names, velocities)
+    )
     return first, second
 
 
@@ -63,12 +65,12 @@ def natural_sizes(system: System, period: float) -> Natural:
     """
     sizes, units = np.zeros(system.n), np.ones(system.n)
     if math.isfinite(period) and period > 0:
-        units[list(_places(system.states, system.coordinates)[1])] = 2 * np.pi / period
+        units[_places(system.states, system.coordinates)[1]] = 2 * np.pi / period
     if system.angles:
         angles, turning = _places(system.states, system.angles)
-        sizes[list(angles)] = _ANGLE
+        sizes[angles] = _ANGLE
         if math.isfinite(period):
-            sizes[list(turning)] = 2 * np.pi * _ANGLE / period
+            sizes[turning] = 2 * np.pi * _ANGLE / period
     return Natural(sizes, units)
 
 
