@@ -233,18 +233,20 @@ class Follower(Iterator[Point]):
             point = back[0]
             found = [f for f in found if f.point.s <= point.s]
         failure: Exception | None = None
-        try:
-            found = self._with_wanted(last, point, found)
-        except Exception as error:  # noqa: BLE001 - the point is sound, whatever a user's function makes of it
-            failure = error
-        if self._stops(found):
-            return
-        self._part(last, point, found)
+        if found or not seen.quiet or self.wanted.anything:
+            try:
+                found = self._with_wanted(last, point, found)
+            except Exception as error:  # noqa: BLE001 - the point is sound, whatever a user's function makes of it
+                failure = error
+            if self._stops(found):
+                return
+            self._part(last, point, found)
         at_point = self._value_at(point)
         self.entries.append(Entry(point, at_point))
         self.accepted += 1
         self.home.remember(self.accepted, point)
-        self._rate = max(self._rate, float(np.abs(point.spectrum.values).max(initial=0.0)))
+        if not seen.quiet:  # a rate of eigenvalues: multipliers are compared on the sphere
+            self._rate = max(self._rate, float(np.abs(point.spectrum.values).max(initial=0.0)))
         self.length = next_length(seen.distance, seen, last, point, settings.steps)
         if at_point is not None and self._named_stop(at_point):
             self.status, self.note = Status.STOPPED, "at a value that was to stop it"
@@ -386,7 +388,7 @@ class Follower(Iterator[Point]):
         own = [f for f in found if f.point.s >= a.s]
         knots = [a, *(f.point for f in sorted(own, key=lambda f: f.point.s)), b]
         found = found + self._monitor.zeros(self.locator, knots)
-        if self.settings.at or self.settings.events:
+        if self.wanted.anything:
             found = found + self.wanted.between(knots)
         return sorted(found, key=lambda f: f.point.s)
 

@@ -55,6 +55,11 @@ class Wanted:
         self._last = [self._told(name, first, _first_value(name, f, first)) for name, f in settings.events]
 
     @property
+    def anything(self) -> bool:
+        """Whether there is anything to look for."""
+        return bool(self._settings.at or self._settings.events)
+
+    @property
     def note(self) -> str:
         """Which functions were not numbers somewhere, in words; empty: none."""
         return "; ".join(self._notes.values())

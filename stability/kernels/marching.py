@@ -279,7 +279,7 @@ def march(  # type: ignore[no-untyped-def]
     by, field, period, span, phase, h, W, A, row_sums, update, b, leading, kept, position, S, jump, scales, weights,
     stage_weights, tolerance, max_iterations, free, own, past, weight, window, limits, pace, watch, older, known, trust,
     orientation, smallest, units, rest, length,
-    P, points, tangents, rates, steps, re, im, readings, signs, T, F, J, Fp, dT, LU, pivots, Z, M, x, products,
+    P, points, tangents, rates, steps, re, im, readings, signs, T, F, J, Fp, dT, LU, pivots, Z, M, x, product,
     spectral, report, seen,
 ):  # fmt: skip
     """Take steps until one is not plainly good; returns how many were taken, at most K.
@@ -290,20 +290,20 @@ def march(  # type: ignore[no-untyped-def]
     rate and the arclength from it (0: there is none). limits : of angle, chord, miss, motion; pace : longest step, far,
     few, approach, creep; watch, trust, and the first and last of known : see quiet_segments; known[1] : error of the
     nodes; smallest, units : sizes of states; rest : period's scale, band of the nodes' error, steps to the next
-    adaption and between adaptions. The rows behind are filled, with T, F, J, Fp, dT, Z, M of each step, products and
-    spectral (K, n, n) the monodromy matrix as it is and scaled, report (K, 4) of Newton's method, and seen (K, 13):
+    adaption and between adaptions. The rows behind are filled, with report (K, 4) of Newton's method and seen (K, 13):
     length tried, distance, then angle, chord, miss and motion over their limits, the next length, int tr J ds,
     roughness, |M f - f| / |f|, whether the reading is complete (else it is the last step), whether the segment is
-    quiet, whether the mesh may rest (else a step after which it is to be adapted is the last one).
+    quiet, whether the mesh may rest (else a step after which it is to be adapted is the last one). T, F, J, Fp, dT, Z,
+    M, x, product and spectral (n, n), the monodromy matrix as it is and scaled, are those of the last step tried.
     """
     taken, size, n = 0, points.shape[1], scales.shape[0]
-    intervals, inner = Z.shape[1], Z.shape[2]
+    intervals, inner = Z.shape[0], Z.shape[1]
     guess, f, column = np.empty(size), np.empty((1, n)), np.empty((1, n, P.shape[1]))
     square, other, packed = np.empty((n, n)), np.empty((n, n)), np.empty(n * n)
     before, after, spare = np.empty(n + 2), np.empty(n + 2), np.empty(12 * n)
     first = (intervals + 1) * n
     count, due = n - own, rest[3]
-    for k in range(M.shape[0]):  # places from a range: a literal 0 would be a type of its own, and compiled once more
+    for k in range(seen.shape[0]):  # from a range: a literal 0 would be a type of its own, compiled once more
         now, row, step = past + k, k + 1, min(length, pace[0])
         change = _predict(points, tangents, rates, steps, k, now, step, pace[1], guess)
         parameter = P[k, free] + change
@@ -319,20 +319,20 @@ def march(  # type: ignore[no-untyped-def]
         stages = u[first : first + intervals * inner].reshape((intervals, inner))
         status = _newton(by[0], (
             (by[1], by[2]), field, period, span, phase, h, W, A, row_sums, update, kept, position, S, jump, scales,
-            weights, stage_weights, P[k + 1], free, u, nodes, stages, T[k], 1, t,
+            weights, stage_weights, P[k + 1], free, u, nodes, stages, T, 1, t,
             t[first : first + intervals * inner].reshape((intervals, inner)), rates[now], weight, 0.0, tolerance,
-            max_iterations, F[k], J[k], Fp[k], dT[k], LU, pivots, Z[k], M[k], x[k], report[k],
+            max_iterations, F, J, Fp, dT, LU, pivots, Z, M, x, report[k],
         ))  # fmt: skip
         moved = P[k + 1, free] - P[k, free]
         if status != 0.0 or not window[0] <= P[k + 1, free] <= window[1]:
             break
-        rates[now + 1] = _normalised(weights, weight, x[k, 1], tangents[now + 1])
+        rates[now + 1] = _normalised(weights, weight, x[1], tangents[now + 1])
         distance, angle, chord, miss = _compare(
             weights, weight, points, tangents, rates, guess, k, now, moved, moved - change
         )
-        trace, rough = summary(M[k], J[k], h, b, leading, scales, nodes, stages, products[k])
-        matrix, gap = spectral[k], 0.0
-        largest = _scaled(products[k], S, scales, matrix)
+        trace, rough = summary(M, J, h, b, leading, scales, nodes, stages, product)
+        matrix, gap = spectral, 0.0
+        largest = _scaled(product, S, scales, matrix)
         if own == 1:
             call_field(field, 1, phase, nodes, P[k + 1], 0, f, other, column)
             gap = _without_flow(matrix, f[0], scales, square, other)
@@ -351,7 +351,7 @@ def march(  # type: ignore[no-untyped-def]
         signs[row + 1] = report[k, 3]
         factor = carried(known[2], rough, trust)
         seen[k, 10] = reading(
-            re[row + 1], im[row + 1], count, factor * known[0], trust, trace * span * T[k, 0], orientation,
+            re[row + 1], im[row + 1], count, factor * known[0], trust, trace * span * T[0], orientation,
             trust[4] * largest * n + gap, readings[row + 1],
         )
         since, earlier = (older[1], older[0]) if k == 0 else (steps[now], rates[max(now - 1, 0)])
@@ -361,7 +361,7 @@ def march(  # type: ignore[no-untyped-def]
         )
         taken, due = k + 1, due - 1.0
         seen[k, 12] = due > 0.0 or _rests(
-            own, stages, T[k, 0], scales, smallest, units, rest[0], factor * known[1], (rest[1], rest[2])
+            own, stages, T[0], scales, smallest, units, rest[0], factor * known[1], (rest[1], rest[2])
         )
         if seen[k, 10] == 0.0 or seen[k, 12] == 0.0:
             break

@@ -1,8 +1,8 @@
 """Several steps along a branch of collocated orbits in one compiled call (kernels/marching.py).
 
-Each step comes back as what `Collocation.correct` would have given, linearisation included, with the measures by which
-the driver judges a step. The arrays of all steps are made at once, row by row; a step that is not asked for costs no
-Python.
+Each step comes back as what `Collocation.correct` would have given, with the measures by which the driver judges a
+step, and its spectrum; the last one, where that is in doubt, with its linearisation instead. A step that is not asked
+for costs no Python.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ _VERDICTS = {1.0: Verdict.STABLE, -1.0: Verdict.UNSTABLE}
 def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
     """The steps of `protocols.Problem.strides`; none where the first one is to be looked at by itself."""
     mesh, flow, K = problem.mesh, problem.flow, ahead.most
-    rule, N, n, m, own = mesh.rule, mesh.intervals, mesh.n, len(ahead.params), mesh.own
+    rule, n, m, own = mesh.rule, mesh.n, len(ahead.params), mesh.own
     if len(ahead.spectra[0].values) != n - own:  # a point without a spectrum of its own
         return
-    past, size, index, count = len(ahead.tangents) - 1, mesh.size, problem.index(ahead.free), N * mesh.degree
+    past, size, index = len(ahead.tangents) - 1, mesh.size, problem.index(ahead.free)
     P, points = np.empty((K + 1, m)), np.empty((K + 1, size))
     tangents, rates, lengths = np.empty((past + K + 1, size)), np.empty(past + K + 1), np.empty(past + K + 1)
     re, im, readings, signs = np.empty((K + 2, n)), np.empty((K + 2, n)), np.empty((K + 2, 9)), np.empty(K + 2)
@@ -44,12 +44,9 @@ def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
     for row, (t, step) in enumerate(zip(reversed(ahead.tangents), reversed(ahead.steps))):
         tangents[row], rates[row], lengths[row] = t.u, t.parameter, step
     comparable = _known(problem, ahead, re, im, readings, signs)
-    F, J, Fp = np.empty((K, count, n)), np.empty((K, count, n, n)), np.empty((K, count, n, m))
-    T, dT, Z, M = np.zeros((K, 1)), np.zeros((K, m)), np.empty((K, N, mesh.degree * n, n)), np.empty((K, N, n, n))
-    x, report, seen = np.empty((K, 2, size + 1)), np.empty((K, 4)), np.empty((K, 13))
-    small = mesh.degree * len(problem.kept)
-    LU, pivots = np.empty((0, small, small)), np.empty((0, small), np.int64)
-    products, spectral, weight = np.empty((K, n, n)), np.empty((K, n, n)), ahead.tangents[0].weight
+    work = Workspace(mesh, m, len(problem.kept), False)
+    x, report, seen = np.empty((2, size + 1)), np.empty((K, 4)), np.empty((K, 13))
+    product, spectral, weight = np.empty((n, n)), np.empty((n, n)), ahead.tangents[0].weight
     level = problem._memo.get("level")
     known = (math.inf, math.inf, 0.0) if level is None or problem.kinked else tuple(map(float, level))
     smallest, units, low, high = resting(problem, float(ahead.u[-1]) if own else problem.orbit_period(ahead.params))
@@ -61,8 +58,8 @@ def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
         _ITERATIONS, index, own, past, weight, ahead.window, ahead.limits, ahead.pace, ahead.watch,
         ahead.older if comparable else (0.0, 0.0), known, TRUST, problem.orientation, smallest, units, rest,
         ahead.length,
-        P, points, tangents, rates, lengths, re, im, readings, signs, T, F, J, Fp, dT, LU, pivots, Z, M, x, products,
-        spectral, report, seen,
+        P, points, tangents, rates, lengths, re, im, readings, signs, work.T, work.F, work.J, work.Fp, work.dT,
+        work.LU, work.pivots, work.Z, work.M, x, product, spectral, report, seen,
     )  # fmt: skip
     for k in range(taken):
         u, params = points[k + 1], P[k + 1]
@@ -79,12 +76,8 @@ def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
             spectrum = Spectrum(values, error_of, int(unstable), int(plus), int(minus), int(pairs), _VERDICTS[verdict])
             tests = tuple(three)
         else:
-            work: Workspace = object.__new__(Workspace)
-            work.F, work.J, work.Fp, work.T, work.dT = F[k], J[k], Fp[k], T[k], dT[k]
-            work.LU, work.pivots, work.Z, work.M = LU, pivots, Z[k], M[k]
-            correction = (x[k, 0, :size], float(x[k, 0, size]), index)
-            L = CollocationLinearisation(problem, u, params, work, sign, correction)
-            vars(L).update(summary=(products[k], trace, rough), spectral=spectral[k], nontrivial=(values, trivial))
+            L = CollocationLinearisation(problem, u, params, work, sign, (x[0, :size], float(x[0, size]), index))
+            vars(L).update(summary=(product, trace, rough), spectral=spectral, nontrivial=(values, trivial))
         found = Corrected(u, params, tangent, residual, int(iterations), int(sign), L, True)
         yield Stride(
             found, tried, distance, angle, chord, missed, motion, following, spectrum, tests, bool(quiet), bool(rests)
