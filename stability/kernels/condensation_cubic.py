@@ -55,10 +55,10 @@ def cubic_terms(  # type: ignore[no-untyped-def]
     width = n + P.shape[0]
     V, W, H = np.zeros((count, width)), np.zeros((count, width)), np.zeros((count, width))
     g, of_W, of_H = np.empty((count, n)), np.empty((count, n)), np.empty((count, n))
-    factors = (A, h, sigma, J, kept, position, LU, pivots)
+    factors, forced = (A, h, sigma, J, kept, position, LU, pivots), X.shape[2]  # a literal 1 would be another type
     for a in range(n):
         start[a] = scales[a] * q[a]
-    _run(sweeps, factors, update, Z, 0, X, start, nodes, stages, V)
+    _run(sweeps, factors, update, Z, forced - 1, X, start, nodes, stages, V)
     call_directional(second, phase, Y, P, (V, V), g, sizes)
     for j in range(intervals):
         for i in range(degree):
@@ -66,7 +66,7 @@ def cubic_terms(  # type: ignore[no-untyped-def]
                 X[j, i * n + a, 0] = sigma * h[j] * g[j * degree + i, a]
     for a in range(n):
         start[a] = 0.0
-    _run(sweeps, factors, update, Z, 1, X, start, nodes, stages, W)
+    _run(sweeps, factors, update, Z, forced, X, start, nodes, stages, W)
     K, right, swaps, order = np.empty((n, n)), np.zeros((1, n)), np.empty(n, np.int32), np.zeros(3, np.int32)
     order[0], order[1] = n, 1
     for a in range(n):
@@ -79,7 +79,7 @@ def cubic_terms(  # type: ignore[no-untyped-def]
     for j in range(intervals):
         for k in range(size):
             X[j, k, 0] = 0.0
-    _run(sweeps, factors, update, Z, 0, X, start, nodes, stages, H)
+    _run(sweeps, factors, update, Z, forced - 1, X, start, nodes, stages, H)
     for a in range(n):
         start[a] = 0.0
         for b in range(n):

@@ -18,6 +18,9 @@ system = st.models.duffing(xi=0.02, beta=0.001)
 method = sys.argv[1]
 if method == "simulate":
     st.simulate(system, (0.0, 10.0), x0={"u": 0.1})
+elif method == "locus":
+    semi = st.continuation(st.Collocation(st.models.autoparametric_pendulum()), "Omega", (0.93, 1.0))
+    st.continuation(st.locus(semi["PD1"], free="length_ratio"), "Omega", (0.94, 0.96))
 else:
     st.continuation(getattr(st, method)(system), "Omega", (0.3, 3.0))
 from numba.core.dispatcher import Dispatcher
@@ -31,12 +34,12 @@ for name, module in list(sys.modules.items()):
 print(json.dumps(found))
 """
 # functions that Python calls, at most so many; a new one is a second and more of everybody's first minute
-MOST = {"Collocation": 11, "HarmonicBalance": 7, "Shooting": 2, "simulate": 2}
+MOST = {"Collocation": 11, "HarmonicBalance": 7, "Shooting": 2, "simulate": 2, "locus": 15}
 
 
 @pytest.mark.parametrize(
     "method",
-    ["simulate", *(pytest.param(m, marks=pytest.mark.slow) for m in ("Collocation", "HarmonicBalance", "Shooting"))],
+    ["simulate", *(pytest.param(m, marks=pytest.mark.slow) for m in ("Collocation", "HarmonicBalance", "Shooting", "locus"))],
 )
 def test_first_use(method: str, tmp_path: Path) -> None:
     """Arrays of another sort (read-only, strided, an integer literal) would compile a kernel or a helper once more."""
