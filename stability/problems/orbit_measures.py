@@ -73,10 +73,12 @@ def fundamental(problem: Collocation, u: Array) -> Array:
     For orbits solved on their whole period; angles may turn.
     """
     mesh = problem.mesh
-    points, stages = mesh.points.ravel(), mesh.split(u)[1].reshape(-1, mesh.n)
-    swing = stages - points[:, None] * problem.whole_winding
-    waves = mesh.weights * np.exp(-2j * np.pi * problem.forcing_periods * points)
-    return np.asarray(2 * np.abs(waves @ swing))
+    points, swing = mesh.points.ravel(), mesh.split(u)[1].reshape(-1, mesh.n)
+    if problem.whole_winding.any():
+        swing = swing - points[:, None] * problem.whole_winding
+    angle = 2 * np.pi * problem.forcing_periods * points
+    real, imaginary = (mesh.weights * wave(angle) @ swing for wave in (np.cos, np.sin))
+    return np.asarray(2 * np.hypot(real, imaginary))
 
 
 def orbit_view(problem: OrbitDiscretisation, u: Array, params: Array) -> PeriodicOrbit:
