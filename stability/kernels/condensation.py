@@ -28,10 +28,11 @@ import numpy as np
 
 from stability.kernels.caching import kernel
 from stability.kernels.elimination import eliminate_lanes, substitute_lanes
+from stability.kernels.vectors import LANES
 
 __all__ = ["condense", "solve_stages", "solve_stages_transposed"]
 
-LANES, MEMORY = 64, 131072  # intervals at a time: at most so many, fewer where their numbers exceed a megabyte
+MEMORY = 98304  # numbers of the intervals that are eliminated together; at least eight of them, at most 64
 
 
 @kernel(inline=True)
@@ -72,7 +73,7 @@ def _expand(A, scale, kept, position, T, size, n, H, columns, j):  # type: ignor
 
 # ---------------------------------------------------------------------- many intervals at a time
 @kernel(inline=True)
-def _template(W, A, row_sums, kept, position, n, columns, first, lanes, T, H, V):  # type: ignore[no-untyped-def]
+def _template(W, A, row_sums, kept, position, n, columns, at, wide, T, H, V):  # type: ignore[no-untyped-def]
     """What of T = [G' | du_0 columns | C'] does not depend on J, and H: sum_k A_ik C_k of the equations x' = v."""
     degree, small, extra = W.shape[0], kept.shape[0], columns.shape[2]
     size = degree * small
@@ -81,32 +82,32 @@ def _template(W, A, row_sums, kept, position, n, columns, first, lanes, T, H, V)
         for i in range(degree):
             row = c * degree + i
             for k in range(size + n):
-                for q in range(lanes):
+                for q in range(wide):
                     T[row, k, q] = 0.0
             for k in range(degree):
-                for q in range(lanes):
+                for q in range(wide):
                     T[row, c * degree + k, q] = W[i, k]
-            for q in range(lanes):
+            for q in range(wide):
                 T[row, size + state, q] = row_sums[i]
             for e in range(extra):
-                for q in range(lanes):
-                    T[row, size + n + e, q] = columns[first + q, i * n + state, e]
+                for q in range(wide):
+                    T[row, size + n + e, q] = columns[at[q], i * n + state, e]
             for e in range(extra):
-                for q in range(lanes):
+                for q in range(wide):
                     H[i, c, e, q] = 0.0
         for k in range(degree if a >= 0 else 0):
             for e in range(extra):
-                for q in range(lanes):
-                    V[e, q] = columns[first + q, k * n + a, e]
+                for q in range(wide):
+                    V[e, q] = columns[at[q], k * n + a, e]
             for i in range(degree):
                 for e in range(extra):
-                    for q in range(lanes):
+                    for q in range(wide):
                         H[i, c, e, q] += A[i, k] * V[e, q]
 
 
 @kernel(inline=True)
-def _assemble(A, scale, J, kept, position, extra, first, lanes, H, slope, T, V, begin, end):  # type: ignore[no-untyped-def]
-    """Add what depends on the Jacobians J of the intervals first .. first + lanes; where rows of G' begin and end."""
+def _assemble(A, scale, J, kept, position, extra, at, wide, H, slope, T, V, begin, end):  # type: ignore[no-untyped-def]
+    """Add what depends on the Jacobians J of the intervals `at`; where rows of G' begin and end."""
     degree, small, n = A.shape[0], kept.shape[0], J.shape[1]
     size = degree * small
     for c in range(small):
@@ -114,36 +115,36 @@ def _assemble(A, scale, J, kept, position, extra, first, lanes, H, slope, T, V, 
             row = c * degree + i
             begin[row], end[row] = c * degree, (c + 1) * degree
             for b in range(n):
-                for q in range(lanes):
-                    V[b, q] = J[(first + q) * degree + i, kept[c], b]
+                for q in range(wide):
+                    V[b, q] = J[at[q] * degree + i, kept[c], b]
             for b in range(small):
                 a, state, coupled = position[b], kept[b], False
                 q = 0
-                while q < lanes and not coupled:
+                while q < wide and not coupled:
                     coupled = V[state, q] != 0.0 or (a >= 0 and V[a, q] != 0.0)
                     q += 1
                 if not coupled:
                     continue
                 begin[row], end[row] = min(begin[row], b * degree), max(end[row], (b + 1) * degree)
-                for q in range(lanes):
+                for q in range(wide):
                     T[row, b * degree + i, q] -= scale[q] * V[state, q]
                 if a < 0:
                     continue
-                for q in range(lanes):
+                for q in range(wide):
                     slope[q] = scale[q] * V[a, q]
                     T[row, size + a, q] += slope[q]
                 for e in range(extra):
-                    for q in range(lanes):
+                    for q in range(wide):
                         T[row, size + n + e, q] += slope[q] * H[i, b, e, q]
-                for q in range(lanes):
+                for q in range(wide):
                     slope[q] *= scale[q]
                 for k in range(degree):
-                    for q in range(lanes):
+                    for q in range(wide):
                         T[row, b * degree + k, q] -= slope[q] * A[i, k]
 
 
 @kernel(inline=True)
-def _collect(A, scale, kept, position, T, size, n, H, first, lanes, V, columns, Z):  # type: ignore[no-untyped-def]
+def _collect(A, scale, kept, position, T, size, n, H, at, wide, V, columns, Z):  # type: ignore[no-untyped-def]
     """The stages of all states from those of the kept ones: columns (N, mn, K) and Z (N, mn, n)."""
     degree, small, extra = A.shape[0], kept.shape[0], columns.shape[2]
     for c in range(small):
@@ -151,27 +152,27 @@ def _collect(A, scale, kept, position, T, size, n, H, first, lanes, V, columns, 
         for i in range(degree):
             row = c * degree + i
             for b in range(n):
-                for q in range(lanes):
-                    Z[first + q, i * n + state, b] = T[row, size + b, q]
+                for q in range(wide):
+                    Z[at[q], i * n + state, b] = T[row, size + b, q]
             for e in range(extra):
-                for q in range(lanes):
-                    columns[first + q, i * n + state, e] = T[row, size + n + e, q]
+                for q in range(wide):
+                    columns[at[q], i * n + state, e] = T[row, size + n + e, q]
             if a < 0:
                 continue
             for b in range(n + extra):
-                for q in range(lanes):
+                for q in range(wide):
                     V[b, q] = 0.0
                 for k in range(degree):
-                    for q in range(lanes):
+                    for q in range(wide):
                         V[b, q] += A[i, k] * T[c * degree + k, size + b, q]
             for b in range(n):
-                for q in range(lanes):
-                    Z[first + q, i * n + a, b] = scale[q] * V[b, q]
-            for q in range(lanes):
-                Z[first + q, i * n + a, a] += 1.0
+                for q in range(wide):
+                    Z[at[q], i * n + a, b] = scale[q] * V[b, q]
+            for q in range(wide):
+                Z[at[q], i * n + a, a] = scale[q] * V[a, q] + 1.0
             for e in range(extra):
-                for q in range(lanes):
-                    columns[first + q, i * n + a, e] = scale[q] * V[n + e, q] + H[i, c, e, q]
+                for q in range(wide):
+                    columns[at[q], i * n + a, e] = scale[q] * V[n + e, q] + H[i, c, e, q]
 
 
 @kernel
@@ -179,27 +180,29 @@ def condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, p
     """Factor every interval, overwrite `columns` (N, mn, K) by X = G^-1 C, fill LU, pivots, Z (N, mn, n), M (N, n, n).
 
     LU (N, ms, ms) and pivots (N, ms) belong to the s kept states; empty ones are left alone. Returns the product of the
-    signs of the determinants (0: a singular interval). Intervals are eliminated together, LANES at most.
+    signs of the determinants (0: a singular interval). Intervals are eliminated together, up to 64.
     """
     intervals, extra = columns.shape[0], columns.shape[2]
     degree, small, n = W.shape[0], kept.shape[0], J.shape[1]
     size = degree * small
     width = size + n + extra
-    most = min(intervals, min(LANES, max(16, MEMORY // (size * width))))
+    most = LANES * max(1, min((intervals + LANES - 1) // LANES, min(64, MEMORY // (size * width)) // LANES))
     T, H, V = np.empty((size, width, most)), np.empty((degree, small, extra, most)), np.empty((n + extra, most))
     swaps, hold, scale = np.empty((size, most), np.int64), np.empty(most), np.empty(most)
-    begin, end = np.empty(size, np.int64), np.empty(size, np.int64)
+    begin, end, at = np.empty(size, np.int64), np.empty(size, np.int64), np.empty(most, np.int64)
     total = 1.0
     for i in range(degree):
         total -= update[i]
     sign = 1.0
     for first in range(0, intervals, most):
         lanes = min(most, intervals - first)
-        for q in range(lanes):
-            scale[q] = h[first + q] * sigma
-        _template(W, A, row_sums, kept, position, n, columns, first, lanes, T, H, V)
-        _assemble(A, scale, J, kept, position, extra, first, lanes, H, hold, T, V, begin, end)
-        sign *= eliminate_lanes(T, size, width, lanes, swaps, hold, begin, end)
+        wide = (lanes + LANES - 1) // LANES * LANES
+        for q in range(wide):  # lanes that are left over do the last interval once more
+            at[q] = min(first + q, intervals - 1)
+            scale[q] = h[at[q]] * sigma
+        _template(W, A, row_sums, kept, position, n, columns, at, wide, T, H, V)
+        _assemble(A, scale, J, kept, position, extra, at, wide, H, hold, T, V, begin, end)
+        sign *= eliminate_lanes(T, size, width, lanes, wide, swaps, hold, begin, end)
         if sign == 0.0:
             return 0.0
         if LU.shape[0] > 0:
@@ -208,8 +211,8 @@ def condense(W, A, row_sums, update, h, sigma, J, kept, position, columns, LU, p
                     pivots[first + q, row] = swaps[row, q]
                     for k in range(size):
                         LU[first + q, row, k] = T[row, k, q]
-        substitute_lanes(T, size, width, lanes, hold, end)
-        _collect(A, scale, kept, position, T, size, n, H, first, lanes, V, columns, Z)
+        substitute_lanes(T, size, width, wide, hold, end)
+        _collect(A, scale, kept, position, T, size, n, H, at, wide, V, columns, Z)
     for j in range(intervals):
         for a in range(n):
             for b in range(n):

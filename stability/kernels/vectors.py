@@ -5,6 +5,7 @@ more than the few entries of a small system's state. Here a sum stays in a regis
 
     K[out, e : e + 4] = K[start, e : e + 4] + h sum_{j < count} weights[r, j] K[places[r, j], e : e + 4]   (or 16)
     K[i, start : start + c] = factor sum_{j < count} J[a, used[j]] V[used[j], 0 : c]
+    T[i, k, :] -= T[i, p, :] T[p, k, :],    eight matrices at a time
 
 Arrays are float64 (places int64) and C-contiguous; the caller sees to it that the entries exist. Four at a time, as
 they are written: a processor hands on what is still being written only to a read that lies within one write.
@@ -20,10 +21,12 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-__all__ = ["combine_four", "combine_sixteen", "product"]
+__all__ = ["LANES", "combine_four", "combine_sixteen", "product", "subtract_lanes"]
 
 _INTEGER = ir.IntType(64)
 _FOUR = ir.VectorType(ir.DoubleType(), 4)
+LANES = 8  # `subtract_lanes` works on a multiple of so many matrices
+_EIGHT = ir.VectorType(ir.DoubleType(), LANES)
 _FUSED = ("contract",)  # a product and a sum may be one instruction where the processor has it
 
 
@@ -115,6 +118,33 @@ def product(typingctx, K, i, start, factor, J, a, used, count, V):  # type: igno
 
             result = builder.fmul(_all(builder, factor), _sums(builder, count, 1, term)[0])
             builder.store(result, rows.four(i, builder.add(start, k)), align=8)
+        return context.get_dummy_value()
+
+    return signature, codegen
+
+
+@intrinsic
+def subtract_lanes(typingctx, T, i, p, first, last, count):  # type: ignore[no-untyped-def]
+    """``T[i, k, :count] -= T[i, p, :count] * T[p, k, :count]`` for first <= k < last, count a multiple of LANES."""
+    integer = types.int64
+    signature = types.void(T, integer, integer, integer, integer, integer)
+
+    def codegen(context, builder, sig, args):  # type: ignore[no-untyped-def]
+        array = context.make_array(sig.args[0])(context, builder, value=args[0])
+        _, columns, depth = cgutils.unpack_tuple(builder, array.shape, 3)
+        _, i, p, first, last, count = args
+        zero, one, step = (ir.Constant(_INTEGER, value) for value in (0, 1, LANES))
+        with cgutils.for_range_slice(builder, zero, count, step, intp=_INTEGER) as (q, _):
+
+            def lanes(row: Any, column: Any) -> Any:
+                place = builder.mul(builder.add(builder.mul(row, columns), column), depth)
+                return builder.bitcast(builder.gep(array.data, [builder.add(place, q)]), _EIGHT.as_pointer())
+
+            factor = builder.load(lanes(i, p), align=8)
+            with cgutils.for_range_slice(builder, first, last, one, intp=_INTEGER) as (k, _):
+                product = builder.fmul(factor, builder.load(lanes(p, k), align=8), flags=_FUSED)
+                place = lanes(i, k)
+                builder.store(builder.fsub(builder.load(place, align=8), product, flags=_FUSED), place, align=8)
         return context.get_dummy_value()
 
     return signature, codegen

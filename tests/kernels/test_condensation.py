@@ -174,6 +174,22 @@ def test_zeros_of_the_jacobian_against_dense_blocks(pattern, oscillator, sigma):
     assert moved or sigma < 50 or pattern == "down"
 
 
+@pytest.mark.parametrize("intervals", (1, 7, 8, 9, 63, 64, 65, 130))
+def test_any_number_of_intervals_against_dense_blocks(intervals):
+    """Intervals are eliminated in groups of multiples of eight; whoever fills up the last group counts for nothing."""
+    c = Case(2, intervals, 2, True, seed=intervals)
+    c.J[:, 1] *= 40.0  # signs of the determinants differ
+    X = c.rng.standard_normal((c.N, c.size, 3))
+    blocks = [c.block(j) for j in range(c.N)]
+    wanted, sizes = np.array([np.linalg.solve(G, x) for G, x in zip(blocks, X)]), [np.linalg.cond(G) for G in blocks]
+    sign = c.condense(X)
+    assert sign == np.prod([np.sign(np.linalg.det(G)) for G in blocks])
+    assert (np.abs(X - wanted).max((1, 2)) < 1e-13 * np.array(sizes) * np.abs(wanted).max((1, 2))).all()
+    ones = np.kron(c.rule.row_sums[:, None], np.eye(2))
+    Z = np.array([np.linalg.solve(G, ones) for G in blocks])
+    assert (np.abs(c.Z - Z).max((1, 2)) < 1e-13 * np.array(sizes) * np.abs(Z).max((1, 2))).all()
+
+
 @pytest.mark.parametrize("case", CASES[:5])
 def test_local_solves_and_sweeps_against_dense_blocks(case):
     c = Case(*case)
