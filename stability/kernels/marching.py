@@ -204,8 +204,8 @@ def _room(re, im, k, count, before, after):  # type: ignore[no-untyped-def]
 
 
 @kernel(inline=True)
-def _compare(weights, weight, points, tangents, rates, guess, k, now, change, miss):  # type: ignore[no-untyped-def]
-    """(distance, angle of the tangents, angle of chord and mean tangent, miss over distance) of point k + 1."""
+def _compare(weights, weight, points, tangents, rates, guess, k, now, change, miss, limits, out):  # type: ignore[no-untyped-def]
+    """Distance of point k + 1, out[1]; out[2:5]: angles of tangents, of chord and mean tangent, miss, over limits."""
     square = cosine = along = missed = 0.0
     for a in range(weights.shape[0]):
         du, t0, t1 = points[k + 1, a] - points[k, a], tangents[now, a], tangents[now + 1, a]
@@ -217,12 +217,24 @@ def _compare(weights, weight, points, tangents, rates, guess, k, now, change, mi
     w2 = weight * weight
     distance = np.sqrt(square + w2 * change * change)
     cosine += w2 * rates[now] * rates[now + 1]
-    angle = np.arccos(max(-1.0, min(1.0, cosine)))
-    if distance == 0.0:
-        return 0.0, angle, 0.0, 0.0
-    along += w2 * change * (rates[now] + rates[now + 1])
-    chord = np.arccos(max(-1.0, min(1.0, along / (distance * np.sqrt(max(2.0 + 2.0 * cosine, 1e-30))))))
-    return distance, angle, chord, np.sqrt(missed + w2 * miss * miss) / distance
+    out[1], out[2] = distance, np.arccos(max(-1.0, min(1.0, cosine))) / limits[0]
+    out[3] = out[4] = 0.0
+    if distance > 0.0:
+        along += w2 * change * (rates[now] + rates[now + 1])
+        chord = along / (distance * np.sqrt(max(2.0 + 2.0 * cosine, 1e-30)))
+        out[3] = np.arccos(max(-1.0, min(1.0, chord))) / limits[1]
+        out[4] = np.sqrt(missed + w2 * miss * miss) / distance / limits[2]
+    return distance
+
+
+@kernel(inline=True)
+def _begin(P, points, k, free, change, guess):  # type: ignore[no-untyped-def]
+    """Row k + 1 of P and points: where Newton's method begins."""
+    for a in range(P.shape[1]):
+        P[k + 1, a] = P[k, a]
+    P[k + 1, free] += change
+    for a in range(guess.shape[0]):
+        points[k + 1, a] = guess[a]
 
 
 @kernel(inline=True)
@@ -306,14 +318,9 @@ def march(  # type: ignore[no-untyped-def]
     for k in range(seen.shape[0]):  # from a range: a literal 0 would be a type of its own, compiled once more
         now, row, step = past + k, k + 1, min(length, pace[0])
         change = _predict(points, tangents, rates, steps, k, now, step, pace[1], guess)
-        parameter = P[k, free] + change
-        if not window[0] <= parameter <= window[1]:
+        if not window[0] <= P[k, free] + change <= window[1]:
             break
-        for a in range(P.shape[1]):
-            P[k + 1, a] = P[k, a]
-        P[k + 1, free] = parameter
-        for a in range(size):
-            points[k + 1, a] = guess[a]
+        _begin(P, points, k, free, change, guess)
         u, t = points[k + 1], tangents[now]
         nodes = u[:first].reshape((intervals + 1, n))
         stages = u[first : first + intervals * inner].reshape((intervals, inner))
@@ -327,29 +334,25 @@ def march(  # type: ignore[no-untyped-def]
         if status != 0.0 or not window[0] <= P[k + 1, free] <= window[1]:
             break
         rates[now + 1] = _normalised(weights, weight, x[1], tangents[now + 1])
-        distance, angle, chord, miss = _compare(
-            weights, weight, points, tangents, rates, guess, k, now, moved, moved - change
+        distance = _compare(
+            weights, weight, points, tangents, rates, guess, k, now, moved, moved - change, limits, seen[k]
         )
         trace, rough = summary(M, J, h, b, leading, scales, nodes, stages, product)
-        matrix, gap = spectral, 0.0
-        largest = _scaled(product, S, scales, matrix)
+        largest, matrix, gap = _scaled(product, S, scales, spectral), spectral, 0.0
         if own == 1:
             call_field(field, 1, phase, nodes, P[k + 1], 0, f, other, column)
             gap = _without_flow(matrix, f[0], scales, square, other)
             matrix = square
         if not _multipliers(by[3], matrix, count, packed, re[row + 1], im[row + 1], spare):
             break
-        seen[k, 0], seen[k, 1] = step, distance
-        seen[k, 2], seen[k, 3], seen[k, 4] = angle / limits[0], chord / limits[1], miss / limits[2]
-        seen[k, 5] = _motion(re, im, row, count) / limits[3]
+        seen[k, 0], seen[k, 5] = step, _motion(re, im, row, count) / limits[3]
         worst = max(max(seen[k, 2], seen[k, 3]), max(seen[k, 4], seen[k, 5]))
         if not (worst <= 1.0 and 0.0 < distance <= 3.0 * step):
             break
         steps[now + 1] = distance
         length = _next_length(distance, worst, report[k, 1], pace, _room(re, im, row, count, before, after))
         seen[k, 6], seen[k, 7], seen[k, 8], seen[k, 9] = length, trace, rough, gap
-        signs[row + 1] = report[k, 3]
-        factor = carried(known[2], rough, trust)
+        signs[row + 1], factor = report[k, 3], carried(known[2], rough, trust)
         seen[k, 10] = reading(
             re[row + 1], im[row + 1], count, factor * known[0], trust, trace * span * T[0], orientation,
             trust[4] * largest * n + gap, readings[row + 1],
@@ -365,6 +368,5 @@ def march(  # type: ignore[no-untyped-def]
         )
         if seen[k, 10] == 0.0 or seen[k, 12] == 0.0:
             break
-        if due <= 0.0:
-            due = rest[4]
+        due = rest[4] if due <= 0.0 else due
     return taken
