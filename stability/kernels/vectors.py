@@ -125,7 +125,10 @@ def product(typingctx, K, i, start, factor, J, a, used, count, V):  # type: igno
 
 @intrinsic
 def subtract_lanes(typingctx, T, i, p, first, last, count):  # type: ignore[no-untyped-def]
-    """``T[i, k, :count] -= T[i, p, :count] * T[p, k, :count]`` for first <= k < last, count a multiple of LANES."""
+    """``T[i, k, :count] -= T[i, p, :count] * T[p, k, :count]`` for first <= k < last, count a multiple of LANES.
+
+    Product and difference are rounded one after the other: all lanes like a single matrix in plain Python.
+    """
     integer = types.int64
     signature = types.void(T, integer, integer, integer, integer, integer)
 
@@ -142,9 +145,9 @@ def subtract_lanes(typingctx, T, i, p, first, last, count):  # type: ignore[no-u
 
             factor = builder.load(lanes(i, p), align=8)
             with cgutils.for_range_slice(builder, first, last, one, intp=_INTEGER) as (k, _):
-                product = builder.fmul(factor, builder.load(lanes(p, k), align=8), flags=_FUSED)
+                product = builder.fmul(factor, builder.load(lanes(p, k), align=8))
                 place = lanes(i, k)
-                builder.store(builder.fsub(builder.load(place, align=8), product, flags=_FUSED), place, align=8)
+                builder.store(builder.fsub(builder.load(place, align=8), product), place, align=8)
         return context.get_dummy_value()
 
     return signature, codegen
