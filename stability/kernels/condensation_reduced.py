@@ -305,8 +305,8 @@ def monodromy_product(M):  # type: ignore[no-untyped-def]
 def summary(M, J, h, b, leading, scales, nodes, Y, product):  # type: ignore[no-untyped-def]
     """What a point of a branch is asked for: (int tr J ds, roughness), and the product M_{N-1} .. M_0.
 
-    The integral by the Gauss weights b; the roughness is the largest m-th derivative over m! of the scaled polynomials,
-    whose coefficients are `leading` (see `gauss`).
+    The integral by the Gauss weights b; the roughness is the largest last term h^m x^(m) / m! of scaled polynomials,
+    whose coefficients are `leading` (see `gauss`): what the mesh resolves worst.
     """
     n, degree = scales.shape[0], b.shape[0]
     trace, rough = 0.0, 0.0
@@ -318,6 +318,6 @@ def summary(M, J, h, b, leading, scales, nodes, Y, product):  # type: ignore[no-
             value = leading[0] * nodes[j, a]
             for i in range(degree):
                 value += leading[i + 1] * Y[j, i * n + a]
-            rough = max(rough, abs(value) / (h[j] ** degree * scales[a]))
+            rough = max(rough, abs(value) / scales[a])
     _multiply_all(M, product, np.empty((n, n)))
     return trace, rough

@@ -149,9 +149,9 @@ def multiplier_error(
     """Change of the multipliers near the unit circle from degree m to m + 1.
 
     Where none is near the circle, but for those that are critical by construction, the change at an earlier point of
-    the same mesh is carried over, times 3 and the square of the growth of the m-th derivative (up to 4): nodes have
-    twice the order of the polynomial. On a curve of special points, whose own error it is, only between points that are
-    nearly as rough.
+    the same mesh is carried over, times 3 and the square of the growth of the last terms h^m x^(m) / m! (up to 4):
+    nodes have twice the order of the polynomial, and a mesh made for one orbit may resolve another one worse. On a
+    curve of special points, whose own error it is, only between points that are nearly as rough.
     """
     solution, roughness = linearisation.solution, linearisation.summary[2]
     problem._memo["roughness"] = solution, roughness
@@ -201,9 +201,9 @@ def carried_to(problem: Collocation, new: Collocation) -> None:
 
 
 def _roughness(problem: Collocation, u: Array) -> float:
-    """Largest m-th derivative of the scaled states."""
+    """The largest last term of the polynomials over the scales: what the mesh resolves worst (`summary`)."""
     known = problem._memo.get("roughness")
     if known is not None and known[0] is u:
         return float(known[1])
     nodes, stages, _ = problem.mesh.split(u)
-    return float(np.abs(problem.mesh.leading(nodes, stages) / problem.scales).max())
+    return float(np.abs(problem.mesh.last_terms(nodes, stages) / problem.scales).max())

@@ -219,7 +219,7 @@ class CollocationLinearisation:
 
     @cached_property
     def summary(self) -> tuple[Array, float, float]:
-        """Phi, int tr J ds, roughness: the largest m-th derivative (over m!) of the solution over its scales."""
+        """Phi, int tr J ds, roughness: the largest last term h^m x^(m) / m! of the polynomials over the scales."""
         mesh, work = self.mesh, self.work
         nodes, stages, _ = mesh.split(self.solution)
         product = np.empty((mesh.n, mesh.n))

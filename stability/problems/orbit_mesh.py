@@ -99,8 +99,12 @@ class OrbitMesh:
 
     def leading(self, nodes: Array, stages: Array) -> Array:
         """(N, n): the m-th derivative over m! of the polynomial with respect to s."""
-        matrix, first, powers = self._derivative
-        return np.asarray((stages @ matrix + first * nodes[:-1]) * powers)
+        return np.asarray(self.last_terms(nodes, stages) * self._derivative[2])
+
+    def last_terms(self, nodes: Array, stages: Array) -> Array:
+        """(N, n): the coefficient of the highest power, h^m times the m-th derivative over m!."""
+        matrix, first, _ = self._derivative
+        return np.asarray(stages @ matrix + first * nodes[:-1])
 
     @cached_property
     def _derivative(self) -> tuple[Array, float, Array]:

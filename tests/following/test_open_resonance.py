@@ -125,3 +125,16 @@ def test_the_amplitude_at_an_end_is_that_of_the_measures():
         problem, u, p = branch._problem(i), branch.unknowns[i], branch._vector(i)
         expected = problem.measures(u, p)["u.amplitude(1)"]
         assert abs(open_resonance._amplitude(problem, u, p) - expected) < 1e-8 * expected
+
+
+def test_a_field_that_fails_far_out_costs_no_branch():
+    """At 10^4 times the amplitude this Python function raises: the branch is finished, and stays."""
+
+    def f(t, x, *, F=0.01, Omega=0.5):
+        if np.abs(x[0]).max() > 100.0:
+            raise RuntimeError("far out")
+        return np.array([x[1], -0.04 * x[1] - x[0] - 0.05 * x[0] ** 3 + F * np.cos(Omega * t)])
+
+    system = st.System.from_function(f, states="x x_dot", period=lambda Omega: 2 * np.pi / Omega)
+    branch = st.continuation(st.Collocation(system), "Omega", (0.4, 0.8))
+    assert branch.status is st.Status.PARAMETER_BOUND

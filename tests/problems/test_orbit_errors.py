@@ -63,3 +63,18 @@ def test_highest_degree_and_orbits_at_their_birth() -> None:
     rest = st.continuation(st.Equilibrium(st.models.van_der_pol()), "mu", (-1, 1))
     cycles = st.continuation(st.switch(rest["HB1"]), "mu", (-1, 1), max_points=5)
     assert np.isfinite(cycles.error[1:]).all()
+
+
+def test_a_mesh_made_for_one_orbit_is_not_trusted_with_another():
+    """A magnet on one side: the sharp turn moves along the orbit, away from the fine part of the mesh, and flattens.
+
+    The error that is carried from point to point must see it (the m-th derivative alone falls). Witness: the error of
+    every orbit by a step of its own.
+    """
+    system = st.models.one_sided_magnet.from_physical()
+    branch = st.continuation(st.Collocation(system), "frequency", (17.0, 30.0), ds_max=0.05, start=None)
+    folds = [p.params["frequency"] for p in branch.special]
+    away = [i for i in range(2, len(branch), 3) if all(abs(branch.parameter[i] - f) > 0.2 for f in folds)]
+    assert len(folds) == 2 and len(away) > 20
+    errors = np.array([branch.solution(i).error for i in away])
+    assert errors.max() < 1e-8 and np.median(errors) < 1e-9
