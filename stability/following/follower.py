@@ -320,14 +320,15 @@ class Follower(Iterator[Point]):
     def _runaway(self, point: Point) -> str:
         """What makes going on senseless, or nothing."""
         size = self._norm_of(point)
-        self._extent.append((point.s, point.parameter))
+        extent = self._extent
+        extent.append((point.s, point.parameter))
         if not math.isfinite(size) or self._growth * size > _GROWTH * max(1.0, self._norm):
             return f"the solution has grown by more than {_GROWTH:g}"
         # a family that stands still in the parameter: a homoclinic orbit whose period grows, a vertical branch
-        recent = self._extent[-_STALL_POINTS:]
-        limit = _STALL / self.settings.weight
-        if len(recent) < _STALL_POINTS or abs(recent[0][1] - point.parameter) >= limit:
+        limit = _STALL / point.tangent.weight
+        if len(extent) < _STALL_POINTS or abs(extent[-_STALL_POINTS][1] - point.parameter) >= limit:
             return ""
+        recent = extent[-_STALL_POINTS:]
         values = [parameter for _, parameter in recent]
         if max(values) - min(values) < limit and point.s - recent[0][0] > _STALL_LENGTH:
             return f"the solutions change, but {self.settings.name} stands still at {point.parameter:.10g}"

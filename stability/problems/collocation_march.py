@@ -49,7 +49,11 @@ def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
     product, spectral, weight = np.empty((n, n)), np.empty((n, n)), ahead.tangents[0].weight
     level = problem._memo.get("level")
     known = (math.inf, math.inf, 0.0) if level is None or problem.kinked else tuple(map(float, level))
-    smallest, units, low, high = resting(problem, float(ahead.u[-1]) if own else problem.orbit_period(ahead.params))
+    resting_sizes = problem._memo.get("resting")  # a period that changes by a few steps makes no difference to them
+    if resting_sizes is None:
+        resting_sizes = resting(problem, float(ahead.u[-1]) if own else problem.orbit_period(ahead.params))
+        problem._memo["resting"] = resting_sizes
+    smallest, units, low, high = resting_sizes
     rest = problem.period_scale, low, high, float(ahead.rest), float(ahead.every)
     taken = marching.march(
         marching.addresses(), flow.address, flow.period_address, mesh.span, mesh.phase, mesh.h, rule.inverse,
@@ -69,7 +73,7 @@ def strides(problem: Collocation, ahead: Stretch) -> Iterator[Stride]:
         values.real, values.imag = re[k + 2, : n - own], im[k + 2, : n - own]
         *seven, trace, rough, trivial, complete, quiet, rests = seen[k].tolist()
         tried, distance, angle, chord, missed, motion, following = seven
-        problem._memo["tangent"] = (u, index, tangent)
+        problem._memo.update(tangent=(u, index, tangent), roughness=(u, rough))
         L = spectrum = tests = None
         if complete:
             error_of, verdict, unstable, plus, minus, pairs, *three = readings[k + 2].tolist()
