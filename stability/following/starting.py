@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError, InputError
 from ..protocols import Corrected, Problem, Seed, Tangent
 from .follower import Entry, Follower
-from .points import Point, dot, make_point, rescaled, smooth_tests, tangent_of
+from .points import Point, dot, make_point, smooth_tests, tangent_of
 from .settings import Settings
 
 __all__ = ["born_sides", "first_point", "inside_window"]
@@ -52,9 +52,7 @@ def first_point(problem: Problem, settings: Settings, start: Any, value: float) 
     better = problem.adapt(found.u, found.params, tangent)
     if better is None:
         return point
-    problem, u, _ = better
-    if u is found.u:
-        return rescaled(point, problem)
+    problem, u, _ = better  # solved again also where only scales are new: the tolerance counts in them
     found = problem.correct(u, found.params, settings.name, None, 0.0, settings.tolerance)
     if not found.converged:
         raise ConvergenceError(f"the first solution was lost when its mesh was adapted: {found.note}", last=point.u)
