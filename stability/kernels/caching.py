@@ -20,9 +20,7 @@ from typing import Any
 
 import numba
 from numba.core.caching import FunctionCache
-from numba.core.compiler import Compiler
-
-from stability.kernels.parts import PartCompiler
+from numba.core.compiler import Compiler, CompilerBase
 
 __all__ = ["kernel"]
 
@@ -30,6 +28,15 @@ _EVERYTHING_A_DAMAGED_FILE_RAISES = (
     EOFError, OSError, ValueError, TypeError, KeyError, IndexError, AttributeError, ImportError, RuntimeError,
     MemoryError,
 )  # fmt: skip
+
+
+def _part_compiler() -> type[CompilerBase]:
+    """That of `parts`; numba's own where its insides are others: then compilation only takes longer."""
+    try:
+        from stability.kernels.parts import PartCompiler
+    except (ImportError, AttributeError):
+        return Compiler
+    return PartCompiler
 
 
 class _GuardedCache(FunctionCache):
@@ -106,7 +113,7 @@ def kernel(
         no_cpython_wrapper=inline,
         forceinline=merged,
         fastmath={"reassoc"} if sums else False,
-        pipeline_class=PartCompiler if inline else Compiler,
+        pipeline_class=_part_compiler() if inline else Compiler,
     )(function)
     if not inline:
         with contextlib.suppress(*_EVERYTHING_A_DAMAGED_FILE_RAISES):
