@@ -8,10 +8,11 @@ product <(u, l), (v, k)> = sum w u v + weight^2 l k:
     compare    angle(t_0, t_1), angle(z_1 - z_0, t_0 + t_1), |z_1 - z| / |z_1 - z_0|, motion of the multipliers
     next       half of the limits, few Newton iterations, not beyond where a multiplier becomes critical
 
-The march ends before the first step that is not plainly good: one that Newton or a check refuses, or that leaves the
-window of the parameter. Whoever asked for it then goes on step by step, and looks for events between the points, where
-`quiet_segments` cannot rule them out. Multipliers: closed form for one or two, LAPACK's dgeev by its address otherwise;
-of an autonomous orbit the direction f of the flow is removed by a reflection (`problems/orbit_spectrum.py`).
+The march ends before the first step that is not plainly good: one that Newton refuses, or a check a few times, or that
+leaves the window of the parameter. Whoever asked for it then goes on step by step, and looks for events between the
+points, where `quiet_segments` cannot rule them out. Multipliers: closed form for one or two, LAPACK's dgeev by its
+address otherwise; of an autonomous orbit the direction f of the flow is removed by a reflection
+(`problems/orbit_spectrum.py`).
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ from stability.kernels.condensation_reduced import summary
 from stability.kernels.quiet_segments import carried, quiet, reading
 
 __all__ = ["addresses", "march"]
+
+RETRIES, SHORT = 3, 0.01  # of steps that a limit refuses, in one march; not below this part of the longest step
 
 _newton = native_call(NEWTON)
 
@@ -114,6 +117,19 @@ def _without_flow(M, f, scales, A, B):  # type: ignore[no-untyped-def]
         for b in range(1, n):
             A[a - 1, b - 1] = B[a, b] - 2.0 * value / size * f[b]
     return gap
+
+
+@kernel(inline=True)
+def _matrices(own, field, P, phase, nodes, product, S, scales, M, f, column, other, square):  # type: ignore[no-untyped-def]
+    """M, and square: M without the flow of an autonomous orbit; returns the largest entry of M and |M f - f| / |f|."""
+    largest = _scaled(product, S, scales, M)
+    if own == 1:
+        call_field(field, 1, phase, nodes, P, 0, f, other, column)
+        return largest, _without_flow(M, f[0], scales, square, other)
+    for a in range(M.shape[0]):
+        for b in range(M.shape[0]):
+            square[a, b] = M[a, b]
+    return largest, 0.0
 
 
 @kernel(inline=True)
@@ -264,6 +280,23 @@ def _rests(own, stages, period, scales, smallest, units, period_scale, error, ba
 
 
 @kernel(inline=True)
+def _look(  # type: ignore[no-untyped-def]
+    k, now, count, re, im, readings, signs, rates, steps, older, moved, watch, error, trust, growth, orientation,
+    rounding, out,
+):  # fmt: skip
+    """out[10], out[11]: whether the multipliers of a new point, and the segment behind it, leave nothing in doubt."""
+    row = k + 1
+    out[10] = reading(
+        re[row + 1], im[row + 1], count, error, trust, growth, orientation, rounding, readings[row + 1]
+    )
+    since, earlier = (older[1], older[0]) if k == 0 else (steps[now], rates[max(now - 1, 0)])
+    out[11] = since > 0.0 and quiet(
+        re, im, row, count, readings, signs, (earlier, rates[now], rates[now + 1]), (steps[now], steps[now + 1]), since,
+        moved, watch,
+    )
+
+
+@kernel(inline=True)
 def _next_length(distance, worst, iterations, pace, room):  # type: ignore[no-untyped-def]
     """`stepping.next_length`; room: in steps like the last one."""
     factor = 2.0 if worst == 0.0 else min(2.0, 0.5 / worst)
@@ -303,7 +336,7 @@ def march(  # type: ignore[no-untyped-def]
     few, approach, creep; watch, trust, and the first and last of known : see quiet_segments; known[1] : error of the
     nodes; smallest, units : sizes of states; rest : period's scale, band of the nodes' error, steps to the next
     adaption and between adaptions. The rows behind are filled, with report (K, 4) of Newton's method and seen (K, 13):
-    length tried, distance, then angle, chord, miss and motion over their limits, the next length, int tr J ds,
+    length asked for, distance, then angle, chord, miss and motion over their limits, the next length, int tr J ds,
     roughness, |M f - f| / |f|, whether the reading is complete (else it is the last step), whether the segment is
     quiet, whether the mesh may rest (else a step after which it is to be adapted is the last one). T, F, J, Fp, dT, Z,
     M, x, product and spectral (n, n), the monodromy matrix as it is and scaled, are those of the last step tried.
@@ -314,9 +347,13 @@ def march(  # type: ignore[no-untyped-def]
     square, other, packed = np.empty((n, n)), np.empty((n, n)), np.empty(n * n)
     before, after, spare = np.empty(n + 2), np.empty(n + 2), np.empty(12 * n)
     first = (intervals + 1) * n
-    count, due = n - own, rest[3]
-    for k in range(seen.shape[0]):  # from a range: a literal 0 would be a type of its own, compiled once more
+    count, due, refused, shortened = n - own, rest[3], 0, False
+    for attempt in range(seen.shape[0] + RETRIES):
+        k = attempt - refused  # from a range: a literal 0 would be a type of its own, compiled once more
+        if k == seen.shape[0]:
+            break
         now, row, step = past + k, k + 1, min(length, pace[0])
+        seen[k, 0] = seen[k, 0] if shortened else step
         change = _predict(points, tangents, rates, steps, k, now, step, pace[1], guess)
         if not window[0] <= P[k, free] + change <= window[1]:
             break
@@ -338,29 +375,26 @@ def march(  # type: ignore[no-untyped-def]
             weights, weight, points, tangents, rates, guess, k, now, moved, moved - change, limits, seen[k]
         )
         trace, rough = summary(M, J, h, b, leading, scales, nodes, stages, product)
-        largest, matrix, gap = _scaled(product, S, scales, spectral), spectral, 0.0
-        if own == 1:
-            call_field(field, 1, phase, nodes, P[k + 1], 0, f, other, column)
-            gap = _without_flow(matrix, f[0], scales, square, other)
-            matrix = square
-        if not _multipliers(by[3], matrix, count, packed, re[row + 1], im[row + 1], spare):
+        largest, gap = _matrices(
+            own, field, P[k + 1], phase, nodes, product, S, scales, spectral, f, column, other, square
+        )
+        if not _multipliers(by[3], square, count, packed, re[row + 1], im[row + 1], spare):
             break
-        seen[k, 0], seen[k, 5] = step, _motion(re, im, row, count) / limits[3]
+        seen[k, 5] = _motion(re, im, row, count) / limits[3]
         worst = max(max(seen[k, 2], seen[k, 3]), max(seen[k, 4], seen[k, 5]))
+        if 1.0 < worst < np.inf and refused < RETRIES and step >= SHORT * pace[0]:  # as the driver would, a few times
+            length, refused, shortened = step * max(0.25, 0.8 / worst), refused + 1, True
+            continue
         if not (worst <= 1.0 and 0.0 < distance <= 3.0 * step):
             break
+        shortened = False
         steps[now + 1] = distance
         length = _next_length(distance, worst, report[k, 1], pace, _room(re, im, row, count, before, after))
         seen[k, 6], seen[k, 7], seen[k, 8], seen[k, 9] = length, trace, rough, gap
         signs[row + 1], factor = report[k, 3], carried(known[2], rough, trust)
-        seen[k, 10] = reading(
-            re[row + 1], im[row + 1], count, factor * known[0], trust, trace * span * T[0], orientation,
-            trust[4] * largest * n + gap, readings[row + 1],
-        )
-        since, earlier = (older[1], older[0]) if k == 0 else (steps[now], rates[max(now - 1, 0)])
-        seen[k, 11] = since > 0.0 and quiet(
-            re, im, row, count, readings, signs, (earlier, rates[now], rates[now + 1]), (steps[now], distance), since,
-            moved, watch,
+        _look(
+            k, now, count, re, im, readings, signs, rates, steps, older, moved, watch, factor * known[0], trust,
+            trace * span * T[0], orientation, trust[4] * largest * n + gap, seen[k],
         )
         taken, due = k + 1, due - 1.0
         seen[k, 12] = due > 0.0 or _rests(

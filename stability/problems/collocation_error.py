@@ -37,7 +37,7 @@ _HIGHEST = 11
 _ALIKE = 0.8  # ratio of roughnesses
 # a carried error: its factor, the growth up to which it is carried; distance from the circle beyond which it may be, as
 # a multiple of it and absolutely; rounding of a product of matrices
-TRUST = (3.0, 4.0, 1e3, 1e-5, 1e-15)
+TRUST = (3.0, 10.0, 1e3, 1e-5, 1e-15)
 
 
 def _same(a: Array, b: Array) -> bool:
@@ -149,7 +149,7 @@ def multiplier_error(
     """Change of the multipliers near the unit circle from degree m to m + 1.
 
     Where none is near the circle, but for those that are critical by construction, the change at an earlier point of
-    the same mesh is carried over, times 3 and the square of the growth of the last terms h^m x^(m) / m! (up to 4):
+    the same mesh is carried over, times 3 and the square of the growth of the last terms h^m x^(m) / m! (up to 10):
     nodes have twice the order of the polynomial, and a mesh made for one orbit may resolve another one worse. On a
     curve of special points, whose own error it is, only between points that are nearly as rough.
     """

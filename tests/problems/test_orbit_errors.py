@@ -5,6 +5,8 @@ Witness: the same special point on a mesh of four times as many intervals of a h
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -78,3 +80,21 @@ def test_a_mesh_made_for_one_orbit_is_not_trusted_with_another():
     assert len(folds) == 2 and len(away) > 20
     errors = np.array([branch.solution(i).error for i in away])
     assert errors.max() < 1e-8 and np.median(errors) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("system", "name", "window"),
+    [
+        (st.models.duffing(xi=0.02, beta=0.001), "Omega", (0.3, 3.0)),
+        (st.models.autoparametric_pendulum(), "Omega", (0.7, 1.3)),
+        (st.models.duffing_textbook(delta=0.1, gamma=5.0), "omega", (8.0, 0.3)),
+    ],
+)
+def test_errors_of_multipliers_along_a_branch_are_not_understated(system, name, window):
+    """Most are carried over from an earlier point. Witness: the step at a higher degree, taken at every point."""
+    branch = st.continuation(st.Collocation(system), name, window)
+    for i in range(0, len(branch), 2):
+        problem = dataclasses.replace(branch._problems[branch.mesh_of[i]], _memo={})
+        params = system.parameter_vector(**{name: branch.parameter[i]})
+        measured = problem.spectrum(problem.linearise(branch.unknowns[i], params)).error
+        assert measured < max(4 * branch.value_errors[i], 1e-9)
