@@ -134,7 +134,23 @@ def _matrices(own, field, P, phase, nodes, product, S, scales, M, f, column, oth
 
 @kernel(inline=True)
 def _multipliers(address, A, count, packed, re, im, room):  # type: ignore[no-untyped-def]
-    """Eigenvalues of the leading (count, count) block of A; False where they could not be had."""
+    """Eigenvalues of the leading (count, count) block of A; False where they could not be had.
+
+    Those that are rounding of the largest become 0: what they are, other ways tell (`orbit_spectrum.contracted`).
+    """
+    if not _raw_multipliers(address, A, count, packed, re, im, room):
+        return False
+    largest = 1.0
+    for i in range(count):
+        largest = max(largest, re[i] * re[i] + im[i] * im[i])
+    for i in range(count):
+        if re[i] * re[i] + im[i] * im[i] < 1e-20 * largest:
+            re[i] = im[i] = 0.0
+    return True
+
+
+@kernel(inline=True)
+def _raw_multipliers(address, A, count, packed, re, im, room):  # type: ignore[no-untyped-def]
     if count <= 2:
         a, b, c, d = A[0, 0], 0.0, 0.0, 0.0
         if count == 1:
@@ -214,7 +230,7 @@ def _room(re, im, k, count, before, after):  # type: ignore[no-untyped-def]
     least = np.inf
     for i in range(count + 2):
         x, y = before[i], after[i]
-        if x * y > 0.0 and abs(y) < abs(x):
+        if x * y > 0.0 and abs(y) < abs(x) < np.inf:
             least = min(least, abs(y) / (abs(x) - abs(y)))
     return least
 

@@ -79,7 +79,7 @@ def test_readings_that_are_in_doubt_are_left_alone():
     growth = math.log(0.26)
     assert read_in_kernel(inside, growth=growth)[0]
     assert not read_in_kernel(inside, known=(np.inf, 0.0), growth=growth)[0]  # nothing known of the mesh
-    assert not read_in_kernel(inside, rough=5.0, growth=growth)[0]  # the orbit has become rougher
+    assert not read_in_kernel(inside, rough=1.01 * TRUST[1], growth=growth)[0]  # the orbit has become much rougher
     assert not read_in_kernel(inside, known=(1e-3, 1.0), growth=growth)[0]  # too inaccurate for its distance
     assert not read_in_kernel(np.array([1.0 + 1e-7 + 0j, 0.5]), growth=math.log(0.5))[0]  # near the circle
     assert not read_in_kernel(np.array([0.9 + 0j, 1e-14]), growth=-35.0)[0]  # lost in the product
