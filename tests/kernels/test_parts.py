@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numba import int64
+from numba import float64, int64
 from numba.core.registry import cpu_target
 
 from stability.kernels.caching import kernel
@@ -55,5 +55,7 @@ def test_parts_are_linked_and_never_become_machine_code_of_their_own():
         return [engine.is_symbol_defined(one.fndesc.llvm_func_name) for one in dispatcher.overloads.values()]
 
     _of_parts(np.ones(1), 1)
+    _root.compile((float64,))  # a kernel from the disk cache brings its parts along, uncompiled
+    _sum_of_roots.compile((float64[::1],))
     assert all(known(_of_parts)) and all(known(monodromy_product))
     assert known(_root) == known(_sum_of_roots) == [False]
