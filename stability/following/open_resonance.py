@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import OpenResonanceWarning
+from ..errors import OpenResonanceWarning, StabilityWarning
 from ..problems.collocation import Collocation
 from ..problems.orbit_measures import fundamental
 from ..results.branch import Branch
@@ -60,7 +60,12 @@ def warn_if_open(branch: Branch, stacklevel: int = 3) -> None:
     for end in ends:
         try:
             share = _share(*_balance(branch, end))
-        except Exception:  # noqa: BLE001 - far out a field may fail in any way; the branch stays
+        except Exception as error:  # noqa: BLE001 - far out a field may fail in any way; the branch stays
+            at = f"{branch.name} = {branch.parameter[end]:g}"
+            warnings.warn(
+                f"whether the resonance stays open beyond {at} is not known: far out on its backbone the equations "
+                f"fail ({type(error).__name__}: {error})", StabilityWarning, stacklevel=stacklevel,
+            )  # fmt: skip
             continue
         if share < 1:
             system = branch.meshes[int(branch.mesh_of[end])].system.name

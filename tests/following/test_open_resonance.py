@@ -127,14 +127,13 @@ def test_the_amplitude_at_an_end_is_that_of_the_measures():
         assert abs(open_resonance._amplitude(problem, u, p) - expected) < 1e-8 * expected
 
 
-def test_a_field_that_fails_far_out_costs_no_branch():
-    """At 10^4 times the amplitude this Python function raises: the branch is finished, and stays."""
+def test_a_field_that_fails_far_out_costs_no_branch_and_says_so(monkeypatch):
+    """The branch is finished when the question is asked: it stays, and that there is no answer is told."""
 
-    def f(t, x, *, F=0.01, Omega=0.5):
-        if np.abs(x[0]).max() > 100.0:
-            raise RuntimeError("far out")
-        return np.array([x[1], -0.04 * x[1] - x[0] - 0.05 * x[0] ** 3 + F * np.cos(Omega * t)])
+    def fails(*_):
+        raise ArithmeticError("beyond its range")
 
-    system = st.System.from_function(f, states="x x_dot", period=lambda Omega: 2 * np.pi / Omega)
-    branch = st.continuation(st.Collocation(system), "Omega", (0.4, 0.8))
+    monkeypatch.setattr(open_resonance, "_share", fails)
+    with pytest.warns(st.errors.StabilityWarning, match="is not known: .*ArithmeticError: beyond its range"):
+        branch = st.continuation(st.Collocation(st.models.duffing(xi=0.02, beta=0.05)), "Omega", (0.3, 3.0))
     assert branch.status is st.Status.PARAMETER_BOUND
